@@ -6,8 +6,8 @@
 !> call `start_processes`, there is one process, and every exchange is a copy or nothing.
 !>
 !> All processes do the same work in the same order, each on its own rows. Everything below from
-!> `global_sum` on is collective: it waits until every process has called it. Never call it where only some
-!> processes come by, nor from several threads at once.
+!> `global_sum` on is collective: it waits until every process has called it. Never call it in a branch that only
+!> some processes take, nor from several threads at once.
 !>
 !> Results do not depend on the number of processes. Therefore MPI never adds numbers that round, because it
 !> may add them in any order: `gather_rows` brings the sums of all rows to every process, which adds them
@@ -130,7 +130,7 @@ contains
 
    ! Numbers that all processes need. Collective.
 
-   !> Elementwise sums of numbers of which all but one are 0.
+   !> Elementwise sums over the processes, each of numbers of which all but one are 0.
    function global_sum_vector(local) result(total)
       real(dp), intent(in) :: local(:)
       real(dp) :: total(size(local))
@@ -142,7 +142,7 @@ contains
 #endif
    end function global_sum_vector
 
-   !> Sum of a count.
+   !> Sum of a count over the processes.
    function global_sum_integer(local) result(total)
       integer, intent(in) :: local
       integer :: total
@@ -236,7 +236,7 @@ contains
          return
       end if
 #endif
-      before = 0*rows
+      before = 0*rows                              ! without MPI the compiler would warn of an unused argument
    end function rows_before
 
    !> Give all processes an integer of the first one.
@@ -263,7 +263,7 @@ contains
 #endif
    end subroutine share_real
 
-   !> Give all processes an array of the first one; its size is known to all.
+   !> Give all processes an array of the first one, which has the same size on all of them.
    subroutine share_reals(values)
       real(dp), intent(inout), contiguous :: values(:)
 #ifdef ASPERITY_MPI

@@ -1,6 +1,7 @@
 !> Operations on files that Fortran lacks: rename, remove, write through to the disk, and so on.
 !>
-!> With an error, the procedures that may return one do nothing, so that a caller may call several in sequence.
+!> A procedure with the argument `error` does nothing if an error is already set. Several of them may therefore be
+!> called in sequence, and the error is checked once, after the last call.
 module file_system
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
    use asperity_errors, only : error_file, error_type, fail

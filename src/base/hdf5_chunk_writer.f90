@@ -115,7 +115,7 @@ contains
       class(hdf5_file_type), intent(inout) :: file
       integer, intent(in) :: first
       type(c_ptr), intent(in) :: address           !! address of the values
-      integer, intent(in) :: count                 !! of its values
+      integer, intent(in) :: count                 !! number of values
       integer(int8), pointer, contiguous :: bytes(:, :)
 
       if (file%has_failed()) return
@@ -183,8 +183,9 @@ contains
       integer :: status
 
       if (self%dataset >= 0) then
+         ! The first call filters the last chunks, and the second one writes them.
          if (.not. file%has_failed()) call work_off(self, file)
-         if (.not. file%has_failed()) call work_off(self, file)      ! for the chunks that have just been filtered
+         if (.not. file%has_failed()) call work_off(self, file)
          status = int(h5dclose(self%dataset))
          if (.not. file%has_failed()) call file%checked(status, 'the dataset cannot be written', self%path, fault)
          call file%settle(fault)

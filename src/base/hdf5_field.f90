@@ -60,8 +60,7 @@ contains
       allocate (slab(wanted(1), min(slab_rows(wanted(1)), wanted(2))))
       do first = 1, wanted(2), size(slab, 2)
          rows = min(size(slab, 2), wanted(2) - first + 1)
-         call self%read(first, slab(:, :rows), error)
-         if (allocated(error)) return
+         call self%slabs%read(self%file, first, slab(:, :rows))   ! after a fault nothing more is read
       end do
    end subroutine try_field
 

@@ -1,6 +1,6 @@
-!> What Fortran needs in addition to the C functions of HDF5 (`hdf5_c`): the constants of C's
-!> headers, texts as C takes them, and the extents of arrays, whose order in C is the reverse of
-!> Fortran's.
+!> What Fortran needs in addition to the C functions of HDF5 (`hdf5_c_objects`, `hdf5_c_values`,
+!> `hdf5_c_lists`): the constants of C's headers, texts as C takes them, and the extents of arrays,
+!> whose order in C is the reverse of Fortran's.
 !>
 !> Constants have the names of HDF5's manual. `status` is negative after a failure.
 module hdf5_library

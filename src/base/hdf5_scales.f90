@@ -76,10 +76,10 @@ module hdf5_scales
 contains
 
    !> Make vectors of a group the scales of datasets in it, each of which has all of these axes.
-   !> Scales that belong to no dataset are marked as scales.
+   !> Without datasets the vectors are only marked as scales.
    subroutine attach_scales(location, folder, scales, datasets, status)
       integer(hid_t), intent(in) :: location      !! the file or a group
-      character(*), intent(in) :: folder          !! the group of them all, seen from there
+      character(*), intent(in) :: folder          !! path from there to the group that contains all of them
       character(*), intent(in) :: scales(:)       !! names of the scales in the order of HDF5's axes
       character(*), intent(in) :: datasets(:)     !! names of the datasets
       integer, intent(out) :: status              !! negative: failed
@@ -121,7 +121,7 @@ contains
       status = status_of(dataset)
    end subroutine open_dataset
 
-   !> Name of an object of a group.
+   !> Path of an object in a group.
    pure function path_of(folder, name) result(path)
       character(*), intent(in) :: folder, name
       character(:), allocatable :: path
@@ -174,11 +174,11 @@ contains
       if (status >= 0) ignored = h5tclose(file_type)
    end subroutine list_users
 
-   !> Write an attribute that is a vector; its type is the same in memory.
+   !> Write a vector as an attribute.
    subroutine put_vector(object, name, type, length, buffer, status)
       integer(hid_t), intent(in) :: object
       character(*), intent(in) :: name
-      integer(hid_t), intent(in) :: type
+      integer(hid_t), intent(in) :: type          !! of an element, in the file and in memory
       integer, intent(in) :: length
       type(c_ptr), intent(in) :: buffer
       integer, intent(out) :: status

@@ -35,7 +35,7 @@ contains
       class(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
       integer, intent(in) :: extent(:)      !! such as nx, ny
-      logical, intent(in) :: bytes          !! of bytes, else of reals
+      logical, intent(in) :: bytes          !! true for bytes, false for reals
       character(*), intent(in) :: units
       character(*), intent(in) :: long_name
       integer, intent(in), optional :: compression   !! 0 none, 9 as small as possible
@@ -84,13 +84,13 @@ contains
       call file%settle(fault, error)
    end subroutine copy_field
 
-   !> Write a part of a dataset of reals or of bytes.
+   !> Write a part of a dataset of reals or of bytes, to which HDF5 converts the values.
    subroutine write_part(file, path, start, extent, values, error)
       class(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
       integer(int64), intent(in) :: start(:)     !! from 0, in Fortran's order of the dimensions
       integer, intent(in) :: extent(:)           !! of the part, in the same order
-      real(dp), intent(in), contiguous, target :: values(:, :)   !! as many
+      real(dp), intent(in), contiguous, target :: values(:, :)   !! as many as the part has
       type(error_type), allocatable, intent(out), optional :: error
 
       call move(file, path, start, extent, h5t_native_double, c_loc(values), .false., error)
@@ -102,7 +102,7 @@ contains
       character(*), intent(in) :: path
       integer(int64), intent(in) :: start(:)     !! from 0, in Fortran's order of the dimensions
       integer, intent(in) :: extent(:)           !! of the part, in the same order
-      real(dp), intent(inout), contiguous, target :: values(:, :)   !! as many
+      real(dp), intent(inout), contiguous, target :: values(:, :)   !! as many as the part has
       type(error_type), allocatable, intent(out), optional :: error
 
       call move(file, path, start, extent, h5t_native_double, c_loc(values), .true., error)

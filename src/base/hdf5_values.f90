@@ -29,7 +29,7 @@ module hdf5_values
    integer, parameter, public :: kind_integer = 2
    integer, parameter, public :: kind_int8 = 3
 
-   integer, parameter, public :: chunk_values = 131072   !! values in a chunk with a checksum, about 1 MiB
+   integer, parameter, public :: chunk_values = 131072   !! values of a chunk with a checksum (1 MiB of reals), at most
    integer, parameter :: column_chunk = 131072        !! rows of a column whose space is set aside
 
 contains
@@ -161,8 +161,8 @@ contains
       integer, intent(in) :: extent(:)      !! in Fortran's order; of size 0 for a single value
       integer, intent(in) :: kind
       type(c_ptr), intent(in) :: buffer
-      !> Of compression: 0 none, to 9. Negative: in one piece and without a checksum, as single
-      !> values are
+      !> Level of compression, from 0 (none) to 9. If it is negative, the dataset is stored in one piece and
+      !> without a checksum, as single values always are.
       integer, intent(in) :: level
       integer, intent(out) :: status
       integer(hid_t) :: space, creation, links, dataset, file_type, memory_type

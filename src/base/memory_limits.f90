@@ -35,7 +35,7 @@ contains
       real(dp), intent(in) :: bytes
       character(*), intent(in) :: task              !! such as 'the run'
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in), optional :: processes    !! of this machine that need as much each; default 1
+      integer, intent(in), optional :: processes    !! number of those on this machine that each need as much; default 1
       character(:), allocatable :: what
       real(dp) :: limit, needed
 

@@ -22,10 +22,11 @@ contains
       text = text//line
    end subroutine add_line
 
-   !> Take the next line of a text that has one; the text has another one as long as `at` is not beyond its end.
+   !> Take the line of a text that starts at `at`, and move `at` to the start of the line after it. The text has no
+   !> more lines when `at` is beyond its end.
    pure subroutine next_line(text, at, line)
       character(*), intent(in) :: text
-      integer, intent(inout) :: at          !! where the line starts; afterwards, where the one after it does
+      integer, intent(inout) :: at          !! 1 for the first line
       character(:), allocatable, intent(out) :: line
       integer :: length
 

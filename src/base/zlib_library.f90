@@ -66,7 +66,7 @@ module zlib_library
 
 contains
 
-   !> Begin a stream. The status is not `z_ok` where memory is short.
+   !> Begin a stream. The status is not `z_ok` if there is not enough memory.
    function start_deflate(stream, level) result(status)
       type(stream_type), intent(inout) :: stream    !! it must not move until `deflate_end`
       integer, intent(in) :: level

@@ -10,13 +10,13 @@ module carried_field
 
 contains
 
-   !> Interpolate a field of the rubber at the cells of the contact, after the contact has moved along the
-   !> rubber by -motion. The interpolation is bilinear. Beyond a free grid the field continues with its values
-   !> at the rim. Collective.
+   !> Move a field along with the contact: moved(X) = field(X + motion). When the rubber moves over the road by
+   !> `motion`, the contact moves along the rubber by -motion. The field is interpolated bilinearly between cells;
+   !> beyond a free grid it continues with its values at the rim. Collective.
    subroutine carry(grid, field, motion, moved)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in), target :: field(:, :)   !! [nx, rows of this process]
-      real(dp), intent(in) :: motion(2)          !! of the rubber over the road, m
+      real(dp), intent(in) :: motion(2)          !! of the rubber over the road, along x and y, m
       real(dp), intent(out) :: moved(:, :)       !! [nx, rows of this process]
       type(row_halo_type) :: halo
       real(dp), allocatable, target :: foreign(:, :)

@@ -51,7 +51,7 @@ contains
       end do
    end function row_product
 
-   !> The same for the quadratic form x.w x with a diagonal w.
+   !> The quadratic form x.(w x) of a row with a diagonal weight w, summed in four parts like `row_product`.
    pure function row_form(weight, x) result(total)
       real(dp), intent(in), contiguous :: weight(:), x(:)
       real(dp) :: total
@@ -168,7 +168,7 @@ contains
       least = global_min(minval(rows))
    end function least_of_rows
 
-   !> Number of cells of the whole grid that a field lives on. Real, since it may exceed the integers.
+   !> Number of cells of the whole grid that a field lives on. It is real because it may exceed the largest integer.
    function cell_count(field) result(cells)
       real(dp), intent(in) :: field(:, :)      !! [nx, rows of this process]
       real(dp) :: cells

@@ -14,9 +14,9 @@ contains
 
    !> The nearest field to x that is nowhere negative and has the sum `total`: max(x - t, 0).
    !> A field that already satisfies both conditions is not changed in any bit. If the total is so small that
-   !> it is nearly lost in the round-off of x, the values that remain are scaled to meet it.
+   !> it is nearly lost in the round-off of x, the values that remain are scaled to meet it. Collective.
    subroutine project_simplex(x, total)
-      real(dp), intent(inout) :: x(:, :)       !! [nx, ny]
+      real(dp), intent(inout) :: x(:, :)       !! [nx, rows of this process]
       real(dp), intent(in) :: total            !! if it is 0 or less, x becomes 0
       real(dp), allocatable :: rows(:, :)
       real(dp) :: cells, all_rows, level, next, above, negative, kept

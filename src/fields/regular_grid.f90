@@ -19,7 +19,7 @@ module regular_grid
 
    real(dp), parameter, public :: block_cells = 8.0_dp   !! cells of a block along a side, if square
 
-   real(dp), parameter :: largest_aspect = 16.0_dp   !! of cells that a stencil fits
+   real(dp), parameter :: largest_aspect = 16.0_dp   !! largest ratio of a cell's sides for which a stencil is accurate
 
    !> Cell (i, j), from 0, has its centre at x = i dx, y = j dy.
    type :: grid_type
@@ -113,7 +113,7 @@ contains
       row = image(self%boundary, self%ny, place)
    end function row_at
 
-   !> Which of n cells, 1 to n, a place is or repeats; 0 beyond a free grid.
+   !> Cell from 1 to n at a place, or the one that the place repeats on a periodic grid; 0 beyond a free grid.
    elemental function image(boundary, n, place) result(cell)
       integer, intent(in) :: boundary, n, place
       integer :: cell

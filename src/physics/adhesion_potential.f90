@@ -48,6 +48,7 @@ module adhesion_potential
    integer :: j
    real(dp), parameter :: part_powers(0:parts - 1) = [(2.0_dp**(-real(j, dp)/parts), j=0, parts - 1)]
 
+   !> A potential with its constants.
    type :: adhesion_potential_type
       integer :: kind = potential_none
       real(dp) :: energy = 0.0_dp              !! gamma_0, J/m2, >= 0
@@ -68,7 +69,7 @@ contains
       real(dp), intent(in) :: energy           !! gamma_0, J/m2, >= 0; ignored for 'none'
       real(dp), intent(in) :: range            !! z_0, m, > 0; ignored for 'none'
       type(error_type), allocatable, intent(out) :: error
-      real(dp), intent(in), optional :: edge   !! m; 0 if absent; limited to the range
+      real(dp), intent(in), optional :: edge   !! of maugis_dugdale, m; 0 if absent; at most the range is used
       character(120) :: text
 
       select case (name)

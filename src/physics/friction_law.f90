@@ -17,8 +17,9 @@
 !> pressure of the wall alone in a closed cell, which is not negative and is zero where the cell opens.
 !> The thesis has p_a = gamma_0/z_0, which is e'(0) of its exponential potential.
 !>
-!> T is out of bounds where s < 1; T* + s D is then the returned traction. This is the admissible
-!> root of the quadratic equation of the thesis (eq. 3.10 and B.5), without its second nappe.
+!> T is out of bounds where s < 1, and T* + s D is then the traction that is returned to the bound. This is the
+!> admissible root of the quadratic equation of the thesis (eq. 3.10 and B.5), whose other root lies on the second
+!> nappe of the friction cone.
 !> Without slope n = 0 and T* = 0.
 !>
 !> Direction of slip. `r` is the slip of the road over the rubber. The slip along the slope is
@@ -83,7 +84,7 @@ contains
    pure function normal_traction(self, p, slope) result(t)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p             !! pressure, Pa
-      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not looked at without slope
+      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not used by a law without slope
       real(dp) :: t(2)                      !! Pa
 
       if (self%slope) then
@@ -97,7 +98,7 @@ contains
    pure function bound_ratio(self, p, slope, d, share) result(s)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p             !! pressure, Pa
-      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not looked at without slope
+      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not used by a law without slope
       real(dp), intent(in) :: d(2)          !! D = T - T*, Pa
       real(dp), intent(in), optional :: share(2)     !! of the bound, see module `shear_law`; 1 if absent
       real(dp) :: s                         !! >= 0; `unbounded` where the ray meets no bound
@@ -171,7 +172,7 @@ contains
       yes = self%shear%bare_strength > 0.0_dp
    end function jumps_at_edge
 
-   !> force/reach; 1 where both vanish, unbounded where only the reach does or it is negative.
+   !> force/reach: 1 if both are zero, and `unbounded` if the reach is negative or only the reach is zero.
    pure function ratio(force, reach) result(s)
       real(dp), intent(in) :: force     !! >= 0, Pa
       real(dp), intent(in) :: reach     !! Pa
@@ -191,8 +192,8 @@ contains
    end function ratio
 
    !> First and second derivative of s(D + a v) for a at a = 0, for a D on the bound (s = 1).
-   !> The traction on the bound then moves by a K_1 + a^2/2 K_2 besides a v, with K_1 = s' D and
-   !> K_2 = s'' D + 2 s' v: the terms of thesis eq. 3.12, in closed form for every law.
+   !> In addition to a v, the traction on the bound then moves by a K_1 + a^2/2 K_2, with K_1 = s' D and
+   !> K_2 = s'' D + 2 s' v. These are the terms of eq. 3.12 of the thesis, in closed form for every law.
    pure subroutine bound_variation(self, p, slope, d, v, first, second)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p
@@ -227,14 +228,15 @@ contains
       second = 2.0_dp*(change/reach)**2 - ddm/reach
    end subroutine bound_variation
 
-   !> Scale D so that the traction lies on the bound, if its s is below a limit.
+   !> Scale D so that the traction lies on the bound, if its ratio s is below a limit. With the limit 1 only a
+   !> traction outside the bound is moved.
    pure subroutine place_on_bound(self, p, slope, limit, t, s, share)
       class(friction_law_type), intent(in) :: self
       real(dp), intent(in) :: p
       real(dp), intent(in) :: slope(2)
-      real(dp), intent(in) :: limit         !! of s; 1: only from outside
+      real(dp), intent(in) :: limit
       real(dp), intent(inout) :: t(2)       !! Pa
-      real(dp), intent(out) :: s            !! before
+      real(dp), intent(out) :: s            !! the ratio before the traction is moved
       real(dp), intent(in), optional :: share(2)     !! of the bound, see module `shear_law`; 1 if absent
       real(dp) :: d(2)
 

@@ -1,9 +1,9 @@
 !> Linear viscoelastic solids as Prony series: a spring and Maxwell arms in parallel.
 !>
-!> G(t) = G_e + sum g exp(-t/tau), with the long-term modulus G_e, the moduli g and the RELAXATION
+!> G(t) = G_e + sum g exp(-t/tau), with the long-term modulus G_e, the moduli g and the relaxation
 !> times tau of the arms. A Zener branch, a spring G_0 in series with a spring G_1 parallel to a
-!> dashpot eta (thesis, section 2.1.3), is exactly a spring and an arm; its creep time eta/G_1 is
-!> not tau. WLF: Williams, Landel and Ferry (1955).
+!> damper eta (thesis, section 2.1.3), is exactly equivalent to a spring and an arm. Its creep time
+!> eta/G_1 is longer than the relaxation time tau of this arm. WLF: Williams, Landel and Ferry (1955).
 module prony
    use asperity_precision, only : dp
    implicit none
@@ -20,8 +20,8 @@ contains
    pure subroutine zener_to_prony(g_inf, g0, g1, eta, g_e, g, tau)
       real(dp), intent(in) :: g_inf         !! spring parallel to all branches, Pa, >= 0
       real(dp), intent(in) :: g0(:)         !! springs in series, Pa, > 0
-      real(dp), intent(in) :: g1(size(g0))  !! springs parallel to the dashpots, Pa, >= 0
-      real(dp), intent(in) :: eta(size(g0)) !! dashpots, Pa s, > 0
+      real(dp), intent(in) :: g1(size(g0))  !! springs parallel to the dampers, Pa, >= 0
+      real(dp), intent(in) :: eta(size(g0)) !! dampers, Pa s, > 0
       real(dp), intent(out) :: g_e          !! long-term modulus, Pa
       real(dp), intent(out) :: g(size(g0))  !! moduli of the arms, Pa
       real(dp), intent(out) :: tau(size(g0))!! relaxation times, s
@@ -31,7 +31,7 @@ contains
       g_e = g_inf + sum(g0*(g1/(g0 + g1)))
    end subroutine zener_to_prony
 
-   !> Factor on every relaxation time at a temperature, log10 a_T = -c1 (T-T_ref)/(c2 + T-T_ref).
+   !> Factor a_T of every relaxation time at a temperature: log10 a_T = -c1 (T - T_ref)/(c2 + T - T_ref).
    elemental function wlf_shift(temperature, reference, c1, c2) result(factor)
       real(dp), intent(in) :: temperature   !! C or K; c2 + temperature - reference must be > 0
       real(dp), intent(in) :: reference     !! in the same scale, where the times were measured
@@ -103,7 +103,7 @@ contains
       compliance = 1.0_dp/instantaneous_modulus(g_e, g) + time*fluidity
       do k = 1, size(lambda)
          x = time/lambda(k)
-         if (x < 1.0_dp) then               ! the same without cancellation
+         if (x < 1.0_dp) then               ! 1 - exp(-x), written so that no digits cancel
             compliance = compliance + strength(k)*2.0_dp*exp(-x/2.0_dp)*sinh(x/2.0_dp)
          else
             compliance = compliance + strength(k)*(1.0_dp - exp(-x))
@@ -176,7 +176,7 @@ contains
       end do
    end subroutine retardation_spectrum
 
-   !> The arms in order of rising time, those of equal time merged, empty ones dropped.
+   !> The arms in the order of rising time. Arms of equal time are merged, and those without modulus are left out.
    pure subroutine distinct_arms(g, tau, g_sorted, tau_sorted)
       real(dp), intent(in) :: g(:)
       real(dp), intent(in) :: tau(size(g))

@@ -18,18 +18,11 @@ contains
    elemental function mean_decay(x) result(phi)
       real(dp), intent(in) :: x             !! >= 0
       real(dp) :: phi                       !! 1 at x = 0, 1/x for large x
-      real(dp) :: term
-      integer :: n
 
       if (x > 1.0_dp) then
          phi = (1.0_dp - exp(-x))/x
       else
-         phi = 0.0_dp
-         term = 1.0_dp                      ! (-x)^n/(n+1)!
-         do n = 0, terms
-            phi = phi + term
-            term = -term*x/real(n + 2, dp)
-         end do
+         phi = series(x, 1, 1.0_dp)
       end if
    end function mean_decay
 
@@ -37,20 +30,30 @@ contains
    elemental function mean_rise(x) result(psi)
       real(dp), intent(in) :: x             !! >= 0
       real(dp) :: psi                       !! 1/2 at x = 0, 1/x for large x
-      real(dp) :: term
-      integer :: n
 
       if (x > 1.0_dp) then
          psi = (1.0_dp - mean_decay(x))/x
       else
-         psi = 0.0_dp
-         term = 0.5_dp                      ! (-x)^n/(n+2)!
-         do n = 0, terms
-            psi = psi + term
-            term = -term*x/real(n + 3, dp)
-         end do
+         psi = series(x, 2, 0.5_dp)
       end if
    end function mean_rise
+
+   !> The power series sum_n (-x)^n/(n+k)!.
+   elemental function series(x, k, first) result(total)
+      real(dp), intent(in) :: x             !! 0 to 1
+      integer, intent(in) :: k
+      real(dp), intent(in) :: first         !! the first term, 1/k!
+      real(dp) :: total
+      real(dp) :: term
+      integer :: n
+
+      total = 0.0_dp
+      term = first
+      do n = 0, terms
+         total = total + term
+         term = -term*x/real(n + k + 1, dp)
+      end do
+   end function series
 
    !> chi = int_0^1 exp(-x (1-s)) (s - 1/2) ds = (1 + exp(-x))/(2x) - (1 - exp(-x))/x^2.
    elemental function slope_response(x) result(chi)

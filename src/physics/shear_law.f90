@@ -7,8 +7,8 @@
 !> with N the pressure on the surface, Pa, not negative. Module `friction_law` puts this bound on the slope of
 !> the road, where the friction force itself changes N.
 !>
-!> A law is one file with an extension of this type, and one line in module `shear_laws`. Solvers never check
-!> which law they have. They only use its procedures and the constants below.
+!> A law is one file with an extension of the type below, and one line in module `shear_laws`. Solvers never check
+!> which law they have. They only use its procedures and its constants.
 !>
 !> A cell may bear only a part of its bound: share(1) is the fraction of the part that grows with the pressure,
 !> and share(2) the fraction of the strengths. Both are 1 in a whole cell.
@@ -19,6 +19,7 @@ module shear_law
 
    public :: shear_law_type
 
+   !> A friction law.
    type, abstract :: shear_law_type
       !> By how much the bound grows with the pressure where that is small. On a slope the bound must grow by
       !> this much at every pressure.
@@ -49,7 +50,7 @@ module shear_law
          import :: dp, shear_law_type
          class(shear_law_type), intent(in) :: self
          real(dp), intent(in) :: pressure         !! N >= 0, Pa
-         real(dp), intent(in) :: share(2)         !! see above, 0 to 1
+         real(dp), intent(in) :: share(2)         !! see the header of this module, 0 to 1
          real(dp) :: force                        !! >= 0, Pa
       end function force_of_cell
    end interface

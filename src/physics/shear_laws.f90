@@ -22,7 +22,7 @@ contains
 
    !> Make a law from its name and constants.
    subroutine choose_shear_law(name, coefficient, strength, law, table)
-      character(*), intent(in) :: name             !! one of the words; without friction that of Coulomb
+      character(*), intent(in) :: name             !! one of the words; 'none' makes Coulomb's law, which is not used
       real(dp), intent(in) :: coefficient          !! mu >= 0
       real(dp), intent(in) :: strength             !! sigma_max >= 0, Pa
       class(shear_law_type), allocatable, intent(out) :: law

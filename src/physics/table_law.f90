@@ -70,7 +70,7 @@ contains
       force = between(self%points, pressure)*share(2)
    end function force
 
-   !> The line at a pressure; bisection finds the last point at or below the pressure.
+   !> The bound at a pressure, on the line behind the last point at or below this pressure, which bisection finds.
    pure function between(points, pressure) result(bound)
       real(dp), intent(in) :: points(:, :)
       real(dp), intent(in) :: pressure

@@ -1,15 +1,15 @@
 !> The discrete energy books of a viscoelastic body: work = change of stored energy + loss, exactly.
 !>
-!> With the scalar product a.b = sum over the cells times the cell area, and the notation of `zener`
-!> (m_k = A p_k), the stored energy is W = 1/2 G_e U.S + sum E_k/(2 g_k), E_k = m_k.p_k (thesis,
-!> eq. 4.1 to 4.3), and E_k follows its own scalar recurrence. Products of tractions and displacements are
+!> With the scalar product a.b = sum over the cells times the cell area, and the notation of `zener`,
+!> the stored energy is W = 1/2 G_e U.S + sum E_k/(2 g_k), where E_k = p_k.A p_k (thesis, eq. 4.1 to
+!> 4.3), and E_k follows its own scalar recurrence. Products of tractions and displacements are
 !> sufficient; A is never inverted. The formulas of work and loss depend on the scheme:
 !>
-!> * exponential, exponential2 and jumps: the exact integrals of P dU and of the dashpots' power
+!> * exponential, exponential2 and jumps: the exact integrals of P dU and of the power of the dampers
 !>   along the path that the scheme assumes within the step, U(t) linear or parabolic; the loss is
 !>   never negative.
 !> * backward Euler: work P'.dU with the traction of the end of the step; the loss is that of the
-!>   dashpots at their mean speed, plus the loss of the scheme itself, which is also booked separately as
+!>   dampers at their mean speed, plus the loss of the scheme itself, which is also booked separately as
 !>   numerical.
 !> * an elastic body, or a body that has relaxed completely: work = change of the stored energy.
 !>
@@ -120,13 +120,15 @@ contains
          g = material%g(k)
          e = self%arm(k)
          r = products%arm_du(k)*self%cell_area
-         loss = loss + x*a**2*(g*d + 2.0_dp*r + e/g)                  ! eta/dt dV.dV/A
-         numerical = numerical + (a**2*g*d - 2.0_dp*a*(a*x)*r + (a*x)**2*e/g)/2.0_dp  ! dm.dm/2gA
+         ! The damper dissipates x E_k'/g in the step, and the scheme loses dp.A dp/(2 g) with dp = p_k' - p_k.
+         loss = loss + x*a**2*(g*d + 2.0_dp*r + e/g)
+         numerical = numerical + (a**2*g*d - 2.0_dp*a*(a*x)*r + (a*x)**2*e/g)/2.0_dp
       end do
       loss = loss + numerical
    end subroutine implicit_step
 
-   !> Work and loss along the path U' = dU + K (s - 1/2), with K = w (dU - dU_old dt/dt_old).
+   !> Work and loss along the path on which U moves at the rate dU + K (s - 1/2) over the time s from 0 to 1, with
+   !> K = w (dU - dU_old dt/dt_old).
    pure subroutine path_step(self, material, products, work, loss)
       type(energy_books_type), intent(in) :: self
       type(zener_type), intent(in) :: material
@@ -151,7 +153,7 @@ contains
          omega = parabola_work(x)
          r = products%arm_du(k)*self%cell_area
          r_k = w*(r - material%ratio*self%arm_du(k))
-         ! Replace the traction at the end by the mean traction along the path.
+         ! P'.dU was formed with the traction at the end of the step: replace that by the traction along the path.
          work = work + (phi - material%alpha(k))*r - chi*r_k &
             + (g*mean_rise(x) - material%b1(k))*d - material%b2(k)*c + g*omega*k_k
          loss = loss + x*mean_decay(2.0_dp*x)/g*self%arm(k) + x*phi**2*r &

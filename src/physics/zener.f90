@@ -4,7 +4,7 @@
 !> the displacement U elastically. Each Maxwell arm k carries the traction p_k; the whole is
 !>
 !>    P = G_e S + sum p_k                                            (thesis, section 2.1.3)
-!>    p_k' = alpha p_k + b1 (S' - S) + b2 (S - S_old)                one step; a prime: its end
+!>    p_k' = alpha p_k + b1 (S' - S) + b2 (S - S_old)                one step; a prime marks its end
 !>    P'   = Q S' - P_h,   Q = G_e + sum b1,   P_h = sum(b1 S - alpha p_k - b2 (S - S_old))
 !>
 !> P_h is the traction of the past. Thus S' = (P' + P_h)/Q holds at each point, and for a contact solver the
@@ -47,7 +47,7 @@ module zener
       integer :: scheme = scheme_exponential2
       integer :: kind = step_jump            !! of the present step
       real(dp) :: dt = 0.0_dp                !! its duration, s
-      real(dp) :: dt_old = 0.0_dp           !! of the step before, s; 0: b2 = 0 (for checkpoints)
+      real(dp) :: dt_old = 0.0_dp            !! duration of the step before, s; 0 if there is none: then b2 = 0
       real(dp) :: q = 0.0_dp                 !! modulus of the step, Pa
       real(dp) :: weight = 0.0_dp            !! w
       real(dp) :: ratio = 0.0_dp             !! dt/dt_old; 0 without a step before
@@ -196,8 +196,7 @@ contains
       if (self%kind == step_regular) self%dt_old = self%dt
    end subroutine finish_step
 
-   !> Note that the load or the speed changes abruptly: the next step does not extrapolate from the step
-   !> before.
+   !> Let the next step not extrapolate from the step before, because the load or the speed changes abruptly.
    pure subroutine restart_order(self)
       type(zener_type), intent(inout) :: self
 
