@@ -27,7 +27,8 @@ module computed_symbol
 
 contains
 
-   !> Between the rows' two passes: transform the columns, multiply by the symbol, transform back.
+   !> The middle part of a product, between the transforms of the rows forward and back: transform the columns, multiply
+   !> by the symbol, and transform the columns back.
    subroutine columns_computed(transform, grid, kernel, inverse, form)
       type(row_column_type), intent(inout) :: transform
       type(grid_type), intent(in) :: grid            !! periodic

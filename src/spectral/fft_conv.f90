@@ -171,10 +171,10 @@ contains
       if (present(single)) self%single = single
       if (self%single) then
          call new_row_column_single(self%low, shape, self%threads, error, memory)
-         call new_symbol_table(self%symbols, shape, self%low%own_columns(), self%single)
+         if (.not. allocated(error)) call new_symbol_table(self%symbols, shape, self%low%own_columns(), self%single)
       else
          call new_row_column_double(self%high, shape, self%threads, error, memory)
-         call new_symbol_table(self%symbols, shape, self%high%own_columns(), self%single)
+         if (.not. allocated(error)) call new_symbol_table(self%symbols, shape, self%high%own_columns(), self%single)
       end if
    end subroutine plan
 
@@ -326,7 +326,8 @@ contains
       if (self%single) call self%low%set_unit(power_of_two(size))
    end subroutine set_unit
 
-   !> Between the rows' two passes: transform the columns, multiply by the symbol, transform back.
+   !> The middle part of a product, between `forward_row` and `backward_row`: transform the columns, multiply by the
+   !> symbol, and transform the columns back.
    subroutine columns(self, action, form)
       class(convolution_type), intent(inout) :: self
       integer, intent(in) :: action                !! columns_apply, columns_inverse or columns_form

@@ -55,7 +55,7 @@ contains
       a_xy = poisson*i_xy/(2.0_dp*pi)
    end subroutine love_tangential
 
-   !> The integrals of y^2/r^3, x^2/r^3 and x y/r^3 over a cell, by their values at its corners.
+   !> The integrals of x^2/r^3, y^2/r^3 and x y/r^3 over a cell, from the antiderivatives at its corners.
    elemental subroutine corner_sums(x, y, dx, dy, i_x2, i_y2, i_xy)
       real(dp), intent(in) :: x, y, dx, dy
       real(dp), intent(out) :: i_x2, i_y2, i_xy

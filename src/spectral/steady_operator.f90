@@ -71,7 +71,7 @@ module steady_operator
 
 contains
 
-   !> Plans for a grid.
+   !> Make the plans for a grid.
    subroutine new_steady_operator(self, grid, frictional, error)
       type(steady_operator_type), intent(out) :: self
       type(grid_type), intent(in) :: grid

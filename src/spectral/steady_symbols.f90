@@ -48,7 +48,7 @@ module steady_symbols
    type :: steady_symbols_type
       complex(dp), allocatable :: normal(:, :)         !! K, m/Pa (first:last, 0:ny-1)
       complex(dp), allocatable :: tangential(:, :, :)  !! A_T: xx, yy, xy, m/Pa (3, first:last, 0:ny-1)
-      complex(dp), allocatable :: stretch(:, :, :)     !! d/ds A_T alike, 1/Pa
+      complex(dp), allocatable :: stretch(:, :, :)     !! d/ds A_T along the motion, of the same shape, 1/Pa
       real(dp) :: longest = 0.0_dp                     !! largest |K|, m/Pa
       real(dp) :: shortest = 0.0_dp                    !! smallest |K|, m/Pa
    end type steady_symbols_type

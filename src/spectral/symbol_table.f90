@@ -97,7 +97,7 @@ contains
    !> mean of the symbols over the whole spectrum. Collective where processes share the columns.
    function self_compliance(self, with_mean) result(compliance)
       class(symbol_table_type), intent(in) :: self
-      logical, intent(in) :: with_mean             !! with the mean mode; without it where periodic
+      logical, intent(in) :: with_mean             !! include the mean mode: needed on a free grid, not on a periodic one
       real(dp) :: compliance
       real(dp) :: symbols(0:self%mx/2), weight
       integer :: i, j
