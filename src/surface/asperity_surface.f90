@@ -91,8 +91,8 @@ contains
       case ('file')
          if (term%file == '') call add_fault(error, error_input, &
             '&surface: file is missing: shape = ''file'' needs the name of an HDF5 file')
-      case default                                ! the variables of a rough surface depend on each other: see `check_self_affine`
-         continue
+      case default
+         continue                                  ! `check_self_affine` checks the variables of a random surface
       end select
    end subroutine check_variable
 

@@ -34,7 +34,7 @@ contains
          call neighbours(periodic, map%grid%ny, j0, south, unused, per_y0)
          call neighbours(periodic, map%grid%ny, j1, unused, north, per_y1)
       end associate
-      ! From here on, numbers of rows are their places.
+      ! From here on, south, north, j0 and j1 are positions in `map%values` and no longer numbers of rows.
       south = map%place(south - 1)
       north = map%place(north - 1)
       j0 = map%place(j0 - 1)

@@ -21,14 +21,16 @@ module height_map
 
    public :: add_map, check_map, checksum_of_map
 
-   !> A map that is being read.
+   !> A map that is being read. The reader remembers its first error: later calls then read zeros, or nothing, and
+   !> the caller checks the error once, at the end.
    type :: map_reader_type
       type(field_reader_type) :: field
       real(dp) :: scale = 1.0_dp
       integer(int64) :: faulty = 0                       !! values so far that are not finite
       integer(int64), allocatable :: rows(:)             !! checksums of the rows so far
-      type(error_type), allocatable :: error             !! the first one
+      type(error_type), allocatable :: error             !! the first error
    contains
+      procedure :: open => open_map
       procedure :: read => read_rows
       procedure :: read_all
       procedure :: finish
@@ -51,9 +53,7 @@ contains
 
       map_checksum = 0_int64
       reads = is_first_process() .or. .not. grid%shared
-      if (reads) call open_map(map, grid, term, error)
-      if (grid%shared) call agree(error)
-      if (allocated(error)) return
+      if (reads) call map%open(trim(term%file), trim(term%dataset), [grid%nx, grid%ny], term%scale)
       allocate (slab(grid%nx, min(slab_rows(grid%nx), grid%ny)))
       do first = 1, grid%ny, size(slab, 2)
          rows = min(size(slab, 2), grid%ny - first + 1)
@@ -91,8 +91,7 @@ contains
       type(map_reader_type) :: map
       integer(int64) :: ignored
 
-      call open_map(map, grid, term, error)
-      if (allocated(error)) return
+      call map%open(trim(term%file), trim(term%dataset), [grid%nx, grid%ny], term%scale)
       call map%read_all()
       call map%finish(term, ignored, error)
    end subroutine check_map
@@ -106,42 +105,33 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(map_reader_type) :: map
 
-      checksum = 0_int64
-      call map%field%open(path, dataset, extent, error)
-      if (allocated(error)) return
-      if (all(map%field%extent == extent)) then
-         allocate (map%rows(extent(2)), source=0_int64)
-         call map%read_all()
-         checksum = checksum_of_checksums(extent(1), map%rows)
-         if (allocated(map%error)) call move_alloc(map%error, error)
-      else
-         call fail(error, error_input, path//': has another shape')
-      end if
+      call map%open(path, dataset, extent, 1.0_dp)
+      call map%read_all()
       call map%field%close()
+      checksum = checksum_of_checksums(extent(1), map%rows)
+      if (allocated(map%error)) call move_alloc(map%error, error)
    end subroutine checksum_of_map
 
-   !> Open the map of a term, and check that it has the shape of the grid.
-   subroutine open_map(self, grid, term, error)
-      type(map_reader_type), intent(inout) :: self
-      type(grid_type), intent(in) :: grid
-      type(surface_settings_type), intent(in) :: term    !! checked
-      type(error_type), allocatable, intent(out) :: error
+   !> Open a map, and check its shape.
+   subroutine open_map(self, path, dataset, extent, scale)
+      class(map_reader_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      character(*), intent(in) :: dataset                !! '': 'surface/height' or 'surface'
+      integer, intent(in) :: extent(2)                   !! nx, ny that the map must have
+      real(dp), intent(in) :: scale                      !! factor of the heights
       character(160) :: text
 
-      self%scale = term%scale
-      allocate (self%rows(grid%ny), source=0_int64)
-      call self%field%open(trim(term%file), trim(term%dataset), [grid%nx, grid%ny], error)
-      if (allocated(error)) then
-         error%message = map_fault(term, error%message)
-      else if (any(self%field%extent /= [grid%nx, grid%ny])) then
-         write (text, '(4(a, i0), a)') 'the height map has the shape (', self%field%extent(2), ', ', &
-            self%field%extent(1), '): must be (ny, nx) = (', grid%ny, ', ', grid%nx, ')'
-         call fail(error, error_input, map_fault(term, trim(text)))
-         call self%field%close()
-      end if
+      self%scale = scale
+      allocate (self%rows(extent(2)), source=0_int64)
+      call self%field%open(path, dataset, extent, self%error)
+      if (allocated(self%error)) return
+      if (all(self%field%extent == extent)) return
+      write (text, '(4(a, i0), a)') 'the height map has the shape (', self%field%extent(2), ', ', &
+         self%field%extent(1), '): must be (ny, nx) = (', extent(2), ', ', extent(1), ')'
+      call fail(self%error, error_input, path//': '//trim(text))
    end subroutine open_map
 
-   !> Read some rows; they are 0 after an error, which `finish` reports.
+   !> Read some rows; they are 0 after an error.
    subroutine read_rows(self, first, values)
       class(map_reader_type), intent(inout) :: self
       integer, intent(in) :: first                       !! the first of them, from 1
@@ -166,6 +156,7 @@ contains
       real(dp), allocatable :: slab(:, :)
       integer :: first, rows
 
+      if (allocated(self%error)) return
       associate (extent => self%field%extent)
          allocate (slab(extent(1), min(slab_rows(extent(1)), extent(2))))
          do first = 1, extent(2), size(slab, 2)
@@ -175,7 +166,7 @@ contains
       end associate
    end subroutine read_all
 
-   !> Close the file, and report the faults that were found.
+   !> Close the file, and report the first error, or how many values are not finite.
    subroutine finish(self, term, checksum, error)
       class(map_reader_type), intent(inout) :: self
       type(surface_settings_type), intent(in) :: term

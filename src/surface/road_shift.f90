@@ -15,7 +15,9 @@ module road_shift
    type :: shift_type
       integer :: whole(2) = 0                         !! whole cells along x and y; modulo a period
       real(dp) :: part(2) = 0.0_dp                    !! the rest, -1/2 to 1/2
-      integer :: first = 0                            !! number of the first row of this process, from 0
+      !> Row of the map, from 0, that lies under the first row of this process after the whole cells. It may lie
+      !> outside the map.
+      integer :: first = 0
    contains
       procedure :: is_whole
    end type shift_type
@@ -46,7 +48,7 @@ contains
       integer, intent(in) :: n
       real(dp), intent(in) :: cells
       integer, intent(out) :: whole
-      real(dp), intent(out) :: part              !! -1/2 to 1/2; 0 if within round-off of it
+      real(dp), intent(out) :: part              !! -1/2 to 1/2; exactly 0 if the shift counts as whole
       real(dp) :: nearest_whole
 
       nearest_whole = anint(cells)

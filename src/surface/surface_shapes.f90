@@ -3,7 +3,7 @@
 !> The table has one row per shape. The input language, the checks, the listing of the settings, the
 !> warnings and the reference page read it, so that a new analytic shape is one row of `all_shapes`
 !> and one function in this file. Shapes without a formula are made elsewhere: random surfaces in
-!> `surface_self_affine`, maps from files in `asperity_surface`.
+!> `surface_self_affine`, maps from files in `height_map`.
 !>
 !> The sphere, the paraboloid and the cylinder have their summit at height 0. On a periodic grid
 !> each cell takes the height that belongs to the nearest image of the summit, so that a shape that
@@ -109,7 +109,7 @@ contains
       end do
    end function shape_words
 
-   !> One row.
+   !> Make a row of the table.
    pure function row(name, meaning, variables, required, formula) result(shape)
       character(*), intent(in) :: name, meaning
       character(*), intent(in) :: variables(:), required(:)
@@ -175,8 +175,8 @@ contains
       h = term%amplitude*cos(2.0_dp*pi*place%x/term%wavelength)
    end function sine
 
-   !> (thesis, eq. 4.6). It repeats after a wavelength along x and wavelength/sqrt(3) along y. The
-   !> product of the sines is the sum of three waves of half the wavelength, at 120 degrees.
+   !> Three crossed waves (thesis, eq. 4.6). The shape repeats after a wavelength along x and wavelength/sqrt(3)
+   !> along y. The product of the sines is the sum of three waves of half the wavelength, at 120 degrees.
    pure function hexagonal_wave(place, term) result(h)
       type(place_type), intent(in) :: place
       type(surface_settings_type), intent(in) :: term

@@ -59,8 +59,8 @@ contains
 
    end subroutine central_slopes
 
-   !> The two cells from which the slope at cell `i` of `n` is taken, and one over their distance in
-   !> cells.
+   !> The two cells from whose heights the slope at cell `i` of `n` is computed, and the reciprocal of their
+   !> distance in cells.
    elemental subroutine neighbours(periodic, n, i, before, behind, per_distance)
       logical, intent(in) :: periodic
       integer, intent(in) :: n

@@ -15,7 +15,7 @@ module surface_warnings
    public :: find_warnings
 
    integer, parameter, public :: warning_length = 400
-   real(dp), parameter :: cells_a_wave = 8.0_dp        !! enough for contact areas of some percent
+   real(dp), parameter :: cells_per_wave = 8.0_dp      !! enough for contact areas of some percent
    real(dp), parameter :: round_off = 1.0e-9_dp
 
 contains
@@ -175,7 +175,7 @@ contains
       cell = max(grid%dx, grid%dy)
       if (along_x .or. grid%ny == 1) cell = grid%dx
       cells = shortest*wavelength/cell
-      if (cells >= cells_a_wave*(1.0_dp - round_off)) return
+      if (cells >= cells_per_wave*(1.0_dp - round_off)) return
       if (cells > 2.0_dp) then
          write (text, '(a, es9.3, a, f0.1, a)') '&surface: '//name//' = ', wavelength, &
             ' m: the shortest wave has ', cells, ' cells; 8 or more are good'
