@@ -58,7 +58,7 @@ contains
    end function adhesion_warning
 
    !> A warning where a sphere is pulled off from a contact of too few cells; empty if there are enough.
-   !> Under a load that presses the contact is larger, and its size in the run is looked at instead.
+   !> Under a load that presses, the contact is larger, and the run checks its size instead (module `contact_size`).
    function pull_off_warning(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -132,7 +132,7 @@ contains
                if (c2 > 0.0_dp) text = text//' C2 = '//to_text(rounded(c2))// &
                   ': adhesion may be neglected if one of them is much less than 1'
             case default
-               continue                        ! there are no criteria for a plane, a ridge or a file
+               continue                        ! there are no criteria for a plane, a cylinder or a file
             end select
          end associate
       end do
@@ -220,13 +220,13 @@ contains
    end function longer_side
 
    !> The largest permissible cell, relative to E* z_0^2/gamma_0.
-   pure function cells_a_zone(case) result(limit)
+   pure function largest_relative_cell(case) result(limit)
       type(case_type), intent(in) :: case
       real(dp) :: limit
 
       limit = smooth_limit
       if (case%adhesion%potential == 'maugis_dugdale') limit = square_limit
-   end function cells_a_zone
+   end function largest_relative_cell
 
    !> The formula for the largest permissible cell.
    pure function zone_in_words(case) result(text)
@@ -243,7 +243,7 @@ contains
       real(dp), intent(in) :: modulus              !! shear modulus, Pa
       real(dp) :: cell
 
-      cell = cells_a_zone(case)*contact_modulus(case, modulus)*case%adhesion%range**2/case%adhesion%energy
+      cell = largest_relative_cell(case)*contact_modulus(case, modulus)*case%adhesion%range**2/case%adhesion%energy
    end function largest_cell
 
    !> The lowest shear modulus with which the material responds in a case, Pa.

@@ -39,13 +39,13 @@ module asperity_schedule
       integer :: row = -1                         !! last row that is done; -1 if none
       integer :: phase = 1                        !! present phase
       integer :: step = 0                         !! number of its steps that are done
-      logical :: entered = .false.                !! the row at its start is done or not needed
+      logical :: entered = .false.                !! the row at the start of the phase is done or not needed
       real(dp) :: start_time = 0.0_dp             !! of the phase, s
       real(dp) :: start_load = 0.0_dp             !! its load at the start, in its own control
       real(dp) :: start_road(2) = 0.0_dp          !! displacement of the road at the start, m
       character(12) :: held_control = ''          !! control of the load so far; '' at the start
       real(dp) :: held_load = 0.0_dp
-      real(dp) :: held_rate = 0.0_dp              !! rate of the load in the last step, over s
+      real(dp) :: held_rate = 0.0_dp              !! rate of the load in the last step, per s
       real(dp) :: velocity(2) = 0.0_dp            !! of the road so far, m/s
       logical :: held_pulled(2) = .false.         !! a force has pulled the road so far
       real(dp) :: held_pull(2) = 0.0_dp           !! that force, Pa

@@ -13,7 +13,7 @@ module case_friction
 
 contains
 
-   !> `&friction`
+   !> Resolve the group `&friction`.
    subroutine resolve_friction(group, friction, faults)
       type(group_values_type), intent(in) :: group
       type(friction_settings_type), intent(inout) :: friction

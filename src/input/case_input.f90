@@ -216,11 +216,11 @@ contains
       end do
    end subroutine check_pulls
 
-   !> `&grid`
+   !> Resolve the group `&grid`.
    subroutine resolve_grid(group, grid, known, faults)
       type(group_values_type), intent(in) :: group
       type(grid_type), intent(out) :: grid
-      logical, intent(out) :: known                    !! the grid can be used in other checks
+      logical, intent(out) :: known                    !! the grid is valid, so that other checks can use it
       type(faults_type), intent(inout) :: faults
       integer :: boundary, nx, ny
       real(dp) :: lx, ly
@@ -252,7 +252,7 @@ contains
       if (.not. known) grid = grid_type()
    end subroutine resolve_grid
 
-   !> `&adhesion`
+   !> Resolve the group `&adhesion`.
    subroutine resolve_adhesion(group, case, faults)
       type(group_values_type), intent(in) :: group
       type(case_type), intent(inout) :: case
@@ -273,7 +273,7 @@ contains
       end if
    end subroutine resolve_adhesion
 
-   !> `&solver`
+   !> Resolve the group `&solver`.
    subroutine resolve_solver(group, case, faults)
       type(group_values_type), intent(in) :: group
       type(case_type), intent(inout) :: case
@@ -294,7 +294,7 @@ contains
          faults)
    end subroutine resolve_solver
 
-   !> `&output`
+   !> Resolve the group `&output`.
    subroutine resolve_output(group, case, faults)
       type(group_values_type), intent(in) :: group
       type(case_type), intent(inout) :: case

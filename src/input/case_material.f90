@@ -15,7 +15,7 @@ module case_material
 
 contains
 
-   !> `&material`
+   !> Resolve the group `&material`.
    subroutine resolve_material(group, grid, grid_known, material, faults)
       type(group_values_type), intent(in) :: group
       type(grid_type), intent(in) :: grid

@@ -265,19 +265,19 @@ contains
       if (.not. group%given('steps')) phase%steps = max(1, nint(phase%duration/dt))
       phase%dt = phase%duration/phase%steps
       if (grid%nx == 0) return
-      cells = cells_a_step(phase, grid)
+      cells = cells_per_step(phase, grid)
       if (phase%dt_reason == one_cell .and. abs(cells - 1.0_dp) < 1.0e-3_dp) return
       if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)//' cells per step'
    end subroutine resolve_steps
 
    !> Distance by which a step moves the road, in cells.
-   pure real(dp) function cells_a_step(phase, grid) result(cells)
+   pure real(dp) function cells_per_step(phase, grid) result(cells)
       type(phase_settings_type), intent(in) :: phase
       type(grid_type), intent(in) :: grid
 
       cells = abs(phase%velocity_x)/grid%dx*phase%dt
       if (grid%ny > 1) cells = max(cells, abs(phase%velocity_y)/grid%dy*phase%dt)
-   end function cells_a_step
+   end function cells_per_step
 
    !> The default time step.
    subroutine default_step(phase, grid, material, dt)
@@ -329,7 +329,7 @@ contains
       real(dp) :: cells, tau
 
       if (phase%static .or. grid%nx == 0) return
-      cells = cells_a_step(phase, grid)
+      cells = cells_per_step(phase, grid)
       if (cells > 1.5_dp) call warn('a step moves the road by '//to_text(cells)// &
          ' cells; to resolve the contact, move it by at most one cell per step, dt = '// &
          to_text(phase%dt/cells)//' s')

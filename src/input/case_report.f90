@@ -141,7 +141,7 @@ contains
       end select
    end function surface_variable
 
-   !> `&adhesion` and `&friction`
+   !> The groups `&adhesion` and `&friction`.
    function laws_text(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
@@ -161,7 +161,7 @@ contains
       text = text//'/'//nl
    end function laws_text
 
-   !> One `&phase`
+   !> One `&phase`.
    function phase_text(phase) result(text)
       type(phase_settings_type), intent(in) :: phase
       character(:), allocatable :: text
@@ -196,7 +196,7 @@ contains
       end if
    end function drive_text
 
-   !> `&solver` and `&output`
+   !> The groups `&solver` and `&output`.
    function solver_text(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text

@@ -47,9 +47,9 @@ module case_settings
    !> `&phase`, with all inherited and derived values.
    type :: phase_settings_type
       character(64) :: name
-      logical :: static                             !! no duration: one solve
+      logical :: static                             !! no duration: one instantaneous solve, or a series of them
       real(dp) :: duration                          !! s; 0 where static
-      integer :: steps                              !! at least 1; 1 where static
+      integer :: steps                              !! at least 1; where static, number of solves up to the load
       real(dp) :: dt                                !! s; 0 where static
       character(64) :: dt_reason                    !! how dt was chosen, in words
       character(word_length) :: control             !! 'pressure' | 'force' | 'displacement'
@@ -74,7 +74,7 @@ module case_settings
       character(word_length) :: slip_law            !! 'physical' | 'thesis'
       character(word_length) :: interpolation       !! 'cubic' | 'linear'
       character(word_length) :: precision           !! 'double' | 'mixed'
-      integer :: threads                            !! 0: all processors
+      integer :: threads                            !! 0: as many as the environment says (module `asperity_threads`)
    end type solver_settings_type
 
    !> `&output`
@@ -83,7 +83,7 @@ module case_settings
       integer :: snapshot_every                     !! steps; 0: only the last
       real(dp), allocatable :: snapshot_times(:)    !! s
       character(word_length), allocatable :: snapshot_fields(:)
-      integer :: checkpoint_every                   !! steps; 0: only when stopped by a signal
+      integer :: checkpoint_every                   !! steps; 0: only by time, and when a run is stopped
       real(dp) :: checkpoint_minutes                !! minutes between checkpoints; 0: none by time
       integer :: compression                        !! deflate level, 0 to 9
    end type output_settings_type

@@ -15,7 +15,7 @@ module case_surfaces
 
 contains
 
-   !> `&surface`, all of them
+   !> Resolve all groups `&surface`.
    subroutine resolve_surfaces(groups, path, grid, grid_known, surfaces, faults)
       type(group_values_type), intent(in) :: groups(:)
       character(*), intent(in) :: path
@@ -34,7 +34,7 @@ contains
       end do
    end subroutine resolve_surfaces
 
-   !> One `&surface`
+   !> Resolve one `&surface`.
    subroutine resolve_surface(group, path, grid, grid_known, term, faults)
       type(group_values_type), intent(in) :: group
       character(*), intent(in) :: path

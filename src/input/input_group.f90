@@ -235,7 +235,7 @@ contains
       type(faults_type), intent(inout) :: faults
       character(*), intent(in), optional :: why       !! the reason why it is required
 
-      if (self%given(name) .or. self%line == 0) return
+      if (self%given(name) .or. self%line == 0) return   ! a missing group is reported as a whole, if at all
       if (present(why)) then
          call self%fault(name, 'is missing: '//why//' needs it', faults)
       else

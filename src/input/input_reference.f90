@@ -278,7 +278,9 @@ contains
             '''mixed'': contact without adhesion is iterated with transforms in single precision and '// &
             'checked in double precision, to the same tolerance; adhesion and friction use double '// &
             'precision. Needs method = ''fast''.'), &
-         row('solver', 'threads', kind_integer, '0', '', '[0, 1024]', 'Number of threads; 0 means all processors.'), &
+         row('solver', 'threads', kind_integer, '0', '', '[0, 1024]', &
+            'Number of threads; 0 means OMP_NUM_THREADS or SLURM_CPUS_PER_TASK if one is set, and otherwise all '// &
+            'processors.'), &
          row('output', 'file', kind_text, '(the input''s name with .h5)', '', 'any', &
             'HDF5 file of the result. Its path is relative to the folder of the input.'), &
          row('output', 'snapshot_every', kind_integer, '0', 'steps', 'not negative', &
@@ -298,7 +300,7 @@ contains
             'hardly any space and take longer.')]
    end function solver_and_output
 
-   !> Does it take a list?
+   !> Does the variable take a list of values?
    pure logical function is_array(entry)
       type(variable_entry_type), intent(in) :: entry
 

@@ -1,5 +1,5 @@
-!> Warnings about values that do not fit together, as where one is given in another unit: very oblong cells,
-!> very steep roads, spheres smaller than the cells, and phases with very many steps.
+!> Warnings about values that do not fit together, for example because one is given in another unit: very oblong
+!> cells, very steep roads, spheres smaller than the cells, and phases with very many steps.
 module scale_warnings
    use asperity_precision, only : dp, pi
    use asperity_schedule, only : count_rows
