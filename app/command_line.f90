@@ -29,7 +29,7 @@ module command_line
    character(*), parameter :: python_verbs(6) = [character(8) :: 'plot', 'report', 'watch', &
       'import', 'fit', 'friction']             !! verbs of the Python package
    character(*), parameter :: verbs(10) = [own_verbs, python_verbs]
-   character(*), parameter :: verbs_there = 'the commands are run, check, template, info, plot, '// &
+   character(*), parameter :: verbs_in_words = 'the commands are run, check, template, info, plot, '// &
       'report, watch, import, fit and friction'
    character(*), parameter :: options(10) = [character(12) :: '--output', '--threads', '--restart', &
       '--overwrite', '--time-limit', '--quiet', '--help', '--version', '--reference', '-h']
@@ -68,7 +68,7 @@ contains
       if (help) then
          call show_help()
       else if (command%verb == '') then
-         if (.not. allocated(error)) call refuse('no command is given: '//verbs_there// &
+         if (.not. allocated(error)) call refuse('no command is given: '//verbs_in_words// &
             '; asperity --help describes them')
       else
          call check_fit(command, error)
@@ -119,7 +119,7 @@ contains
                help = .true.
             else if (.not. any(verbs == argument)) then
                call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
-                  hint(nearest_name(argument, verbs))//'; '//verbs_there)
+                  hint(nearest_name(argument, verbs))//'; '//verbs_in_words)
                done = .true.
             else if (any(python_verbs == argument)) then
                call refuse(''''//argument//''' must be the first word; its options follow it')

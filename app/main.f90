@@ -47,9 +47,9 @@ program main
       case ('check')
          call check(error)
       case default
-         ! The program may be replaced by another one, which cannot take part in exchanges with other processes.
+         ! Python may take the place of this program, and cannot take part in exchanges with other processes.
          call end_processes()
-         if (is_first_process()) call tell(error)
+         if (is_first_process()) call carry_out_alone(error)
       end select
    end if
    status = 0
@@ -63,8 +63,8 @@ program main
 
 contains
 
-   !> Commands that do not read a case: only one process carries them out.
-   subroutine tell(error)
+   !> Carry out a command that does not read a case. Only one process does this.
+   subroutine carry_out_alone(error)
       type(error_type), allocatable, intent(out) :: error
 
       select case (command%verb)
@@ -83,9 +83,9 @@ contains
             call become_python(error, command%handed_over, '--help')
          end if
       end select
-   end subroutine tell
+   end subroutine carry_out_alone
 
-   !> asperity template [NAME]
+   !> Carry out `asperity template [NAME]`.
    subroutine template(error)
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: message, near
@@ -106,7 +106,7 @@ contains
       end if
    end subroutine template
 
-   !> asperity check CASE.nml
+   !> Carry out `asperity check CASE.nml`.
    subroutine check(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_type) :: case
@@ -119,7 +119,7 @@ contains
       call agree(error)
    end subroutine check
 
-   !> asperity info RESULT.h5
+   !> Carry out `asperity info RESULT.h5`. A result that is damaged may still have a part that can be described.
    subroutine info(error)
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: saying
@@ -130,21 +130,14 @@ contains
       if (.not. allocated(error) .and. allocated(saying)) call move_alloc(saying, error)
    end subroutine info
 
-   !> asperity run CASE.nml
+   !> Carry out `asperity run CASE.nml`.
    subroutine run(error)
       type(error_type), allocatable, intent(out) :: error
       type(case_type) :: case
 
       if (process_count() == 1) call refuse_copies(error)
-      if (allocated(error)) return
-      call read_case(command%path, case, error)
-      if (allocated(error)) return
-      if (allocated(command%output)) then
-         call choose_output(case, error)
-      else if (is_other_than_file(command%path) .and. case%output%file == default_result(command%path)) then
-         call fail(error, error_input, command%path//': is not a regular file, so that the result needs a '// &
-            'name: give --output FILE.h5')
-      end if
+      if (.not. allocated(error)) call read_case(command%path, case, error)
+      if (.not. allocated(error)) call choose_output(case, error)
       call agree(error)
       if (allocated(error)) return
       if (command%threads > 0) case%solver%threads = command%threads
@@ -153,11 +146,18 @@ contains
       call run_steps(case, error)
    end subroutine run
 
-   !> Replace the file that the case names by that of --output.
+   !> Replace the file of the result that the case names by that of --output. Without the option the result is
+   !> named after the input, which must then be a regular file.
    subroutine choose_output(case, error)
       type(case_type), intent(inout) :: case
       type(error_type), allocatable, intent(out) :: error
 
+      if (.not. allocated(command%output)) then
+         if (is_other_than_file(command%path) .and. case%output%file == default_result(command%path)) &
+            call fail(error, error_input, command%path//': is not a regular file, so that the result needs a '// &
+            'name: give --output FILE.h5')
+         return
+      end if
       if (len(command%output) > path_length) then
          call fail(error, error_input, 'asperity: --output: the path has '//to_text(len(command%output))// &
             ' characters: at most '//to_text(path_length)//' are allowed')
@@ -170,7 +170,7 @@ contains
 
    !> Do the steps of a run. A signal or the time limit stops it after the present step, with a
    !> checkpoint; both also abandon a step that takes long. A signal to any process counts for all of
-   !> them, and all go by the clock of the first process.
+   !> them, and the clock of the first process decides about the time limit.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
@@ -188,7 +188,7 @@ contains
             command%quiet .or. .not. is_first_process())
 
          do while (.not. run%finished)
-            call tell_warnings(run, progress)
+            call print_warnings(run, progress)
             signal = nint(global_max(real(stop_signal(), dp)))
             near = limit%is_near()
             call share(near)
@@ -216,7 +216,7 @@ contains
             if (allocated(error)) exit
          end do
 
-         call tell_warnings(run, progress)
+         call print_warnings(run, progress)
          call progress%finish()
       end if
       call run%close(closing)
@@ -245,7 +245,7 @@ contains
    end subroutine stop_run
 
    !> Print new warnings of a run on lines of their own, after ending the line of the progress.
-   subroutine tell_warnings(run, progress)
+   subroutine print_warnings(run, progress)
       type(run_type), intent(inout) :: run
       type(progress_type), intent(inout) :: progress
 
@@ -253,6 +253,6 @@ contains
       call progress%finish()
       if (is_first_process()) call say_error(run%warnings)
       run%warnings = ''
-   end subroutine tell_warnings
+   end subroutine print_warnings
 
 end program main

@@ -13,7 +13,7 @@ module row_interrupts
 
 contains
 
-   !> Must the run stop? 1 or 0, for module `row_stop`. All processes go by the clock of the first one.
+   !> Must the run stop? 1 or 0, for module `row_stop`. Only the clock of the first process counts.
    function must_stop() bind(c) result(yes)
       integer(c_int) :: yes
 

@@ -14,7 +14,7 @@ module flat_answers
    implicit none
    private
 
-   public :: case_of, grid_of, put_text, report, see_memory, take_warnings, tell
+   public :: case_of, check_memory, grid_of, put_text, report, return_outcome, take_warnings
 
 contains
 
@@ -41,7 +41,7 @@ contains
    end subroutine case_of
 
    !> Check that there is memory for some fields of a grid.
-   subroutine see_memory(grid, fields, task, error)
+   subroutine check_memory(grid, fields, task, error)
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: fields                        !! doubles per cell; a free grid is padded
       character(len=*), intent(in) :: task
@@ -51,10 +51,10 @@ contains
       cells = real(grid%nx, dp)*grid%ny
       if (grid%boundary == boundary_free) cells = 1.6_dp*cells
       call need_memory(8.0_dp*fields*cells, task, error)
-   end subroutine see_memory
+   end subroutine check_memory
 
    !> Copy the outcome of a solve to the arguments of a call.
-   subroutine tell(outcome, iterations, ffts, residual, seconds, converged, reason)
+   subroutine return_outcome(outcome, iterations, ffts, residual, seconds, converged, reason)
       type(solver_result_type), intent(in) :: outcome
       integer(c_int), intent(out) :: iterations
       real(c_double), intent(out) :: ffts, residual, seconds
@@ -67,7 +67,7 @@ contains
       seconds = outcome%seconds
       converged = merge(1, 0, outcome%converged)
       reason = outcome%reason
-   end subroutine tell
+   end subroutine return_outcome
 
    !> Turn an error into a status and a message.
    subroutine report(error, status, message)

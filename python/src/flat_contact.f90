@@ -10,7 +10,7 @@ module flat_contact
    use contact_solver, only : contact_solver_type
    use fft_conv, only : new_convolution
    use field_sums, only : field_count, field_mean, field_rms
-   use flat_answers, only : grid_of, report, see_memory, tell
+   use flat_answers, only : check_memory, grid_of, report, return_outcome
    use kernels, only : normal_half_space, tangential_half_space
    use normal_solvers, only : new_contact_solver
    use normal_state, only : control_approach, control_pressure, normal_problem_type
@@ -58,7 +58,7 @@ contains
 
       level = 0.0_dp
       grid = grid_of(nx, ny, lx, ly, is_free)
-      call see_memory(grid, 12, 'the contact', error)
+      call check_memory(grid, 12, 'the contact', error)
       ! E* = 2 G/(1 - nu) is all that the normal problem knows of the material: take nu = 0.
       if (.not. allocated(error)) call new_contact_solver(solver, trim(merge('thesis', 'fast  ', thesis == 1)), &
          grid, normal_half_space(0.0_dp), error)
@@ -73,11 +73,11 @@ contains
          call solver%solve(problem, height, pressure, gap, level, outcome)
          call solver%destroy()
       end if
-      call tell(outcome, iterations, ffts, residual, seconds, converged, reason)
+      call return_outcome(outcome, iterations, ffts, residual, seconds, converged, reason)
       call report(error, status, message)
    end subroutine contact_normal
 
-   !> Elastic normal contact with adhesion: one row of the step loop.
+   !> Elastic normal contact with adhesion, solved as one row of a run.
    subroutine contact_adhesive(height, pressure, gap, attraction, nx, ny, lx, ly, is_free, modulus, &
       potential, energy, range_, values, table, approach, load, start, thesis, tolerance, &
       max_iterations, old_level, level, energy_adhesive, contact_area, iterations, ffts, residual, &
@@ -142,7 +142,7 @@ contains
       if (approach == 1) task%control = 'displacement'
       task%load = load
       task%first = start /= 2
-      call see_memory(grid, merge(49, 25, is_free == 1), 'the contact', error)
+      call check_memory(grid, merge(49, 25, is_free == 1), 'the contact', error)
       if (.not. allocated(error)) call new_normal_step(side, grid, normal_half_space(0.0_dp), solver, &
          adhesion, edge_of_cells(energy, range_, modulus, merge(grid%dx, max(grid%dx, grid%dy), ny == 1)), &
          height, error)
@@ -157,11 +157,11 @@ contains
          end do
          call side%destroy()
       end if
-      call tell(outcome, iterations, ffts, residual, seconds, converged, reason)
+      call return_outcome(outcome, iterations, ffts, residual, seconds, converged, reason)
       call report(error, status, message)
    end subroutine contact_adhesive
 
-   !> A warning if the patches of a contact are too few cells across, as at the end of a run; otherwise a blank.
+   !> The warning of a run if the patches of a contact are too few cells wide; otherwise a blank.
    subroutine contact_width(pressure, gap, nx, ny, lx, ly, is_free, adhesive, warning, status, message)
       integer(c_int), intent(in) :: nx, ny
       real(c_double), intent(in) :: pressure(nx, ny)           !! Pa
@@ -201,7 +201,7 @@ contains
       handle = 0
       mx = 0
       my = 0
-      call see_memory(grid_of(nx, ny, lx, ly, is_free), merge(8, 4, tangential == 1), 'the operator', error)
+      call check_memory(grid_of(nx, ny, lx, ly, is_free), merge(8, 4, tangential == 1), 'the operator', error)
       if (.not. allocated(error)) call new_operator(number, operator, error)
       if (.not. allocated(error)) then
          operator%modulus = modulus

@@ -27,7 +27,7 @@ contains
       text = version_number
    end subroutine library_version
 
-   !> Use `n` threads from now on, or all processors if n is 0, and return the number of threads.
+   !> Use `n` threads from now on, or as many as the environment says if n is 0, and return their number.
    subroutine set_thread_count(n, used)
       integer(c_int), intent(in) :: n
       integer(c_int), intent(out) :: used

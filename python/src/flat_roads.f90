@@ -5,7 +5,7 @@ module flat_roads
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp, int64
    use asperity_surface, only : new_height
-   use flat_answers, only : grid_of, report, see_memory
+   use flat_answers, only : check_memory, grid_of, report
    use height_map, only : checksum_of_map
    use regular_grid, only : grid_type
    use roughness, only : height_psd, height_statistics, radial_psd, roughness_type
@@ -42,7 +42,7 @@ contains
       integer :: i, j
 
       grid = grid_of(nx, ny, lx, ly, is_free)
-      call see_memory(grid, 4, 'the surface', error)
+      call check_memory(grid, 4, 'the surface', error)
       if (allocated(error)) then
          call report(error, status, message)
          return
@@ -83,7 +83,7 @@ contains
       character(len=2000), intent(out) :: message
       type(error_type), allocatable :: error
 
-      call see_memory(grid_of(nx, ny, lx, ly, 0_c_int), 4, 'the spectrum', error)
+      call check_memory(grid_of(nx, ny, lx, ly, 0_c_int), 4, 'the spectrum', error)
       if (.not. allocated(error)) &
          call height_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, psd, error)
       call report(error, status, message)
@@ -106,7 +106,7 @@ contains
       integer, allocatable :: ring_modes(:)
 
       rings = 0
-      call see_memory(grid_of(nx, ny, lx, ly, 0_c_int), 4, 'the spectrum', error)
+      call check_memory(grid_of(nx, ny, lx, ly, 0_c_int), 4, 'the spectrum', error)
       if (.not. allocated(error)) call radial_psd(grid_of(nx, ny, lx, ly, 0_c_int), height, &
          ring_wave_numbers, ring_psd, ring_modes, error)
       if (.not. allocated(error)) then
@@ -134,7 +134,7 @@ contains
       type(error_type), allocatable :: error
       type(roughness_type) :: found
 
-      call see_memory(grid_of(nx, ny, lx, ly, is_free), 4, 'the statistics', error)
+      call check_memory(grid_of(nx, ny, lx, ly, is_free), 4, 'the statistics', error)
       if (.not. allocated(error)) &
          call height_statistics(grid_of(nx, ny, lx, ly, is_free), height, found, error)
       values = [found%mean, found%lowest, found%highest, found%rms_height, found%skewness, &

@@ -60,7 +60,7 @@ contains
          if (output /= '') then
             case%output%file = output
             if (overwritten_file(case) /= '') call fail(error, error_input, 'output = '//output// &
-               ': would be written over '//overwritten_file(case))
+               ': would overwrite '//overwritten_file(case))
          end if
       end if
 

@@ -162,9 +162,9 @@ contains
 
       call find_driven(int(handle), driven, error)
       if (.not. allocated(error)) then
-         call writer%start(path, 'a simulation', driven%settings, error)
-         if (.not. allocated(error)) call save_state(driven%sim, writer, error)
-         if (.not. allocated(error)) call writer%commit(error)
+         call writer%start(path, 'a simulation', driven%settings)
+         call save_state(driven%sim, writer)
+         call writer%commit(error)             ! the first fault of the three calls
       end if
       call report(error, status, message)
    end subroutine simulation_save

@@ -397,7 +397,7 @@ def test_runs_of_a_case_a_text_and_a_file_are_the_same(tmp_path, monkeypatch):
     for run in (second, third):
         assert run.input == first.input == str(case)
         np.testing.assert_array_equal(run.snapshots[-1].pressure, first.snapshots[-1].pressure)
-    with pytest.raises(ValueError, match="written over the input"):
+    with pytest.raises(ValueError, match="would overwrite the input"):
         asperity.run(case, output="road.nml")
     assert Path("road.nml").read_text() == str(case)
     with pytest.raises(ValueError, match="&grid: nx: is missing"):

@@ -275,9 +275,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: count
 
-      call self%file%read_attribute('/state', 'pieces', count, error)
-      if (allocated(error)) return
-      if (count /= table%count) call fail(error, error_input, self%file%path//': the state has '// &
+      call self%file%read_attribute('/state', 'pieces', count, error)      ! 0 after a fault
+      if (allocated(error) .or. count == table%count) return
+      call fail(error, error_input, self%file%path//': the state has '// &
          to_text(count)//' pieces, the case needs '//to_text(table%count)// &
          ': it was written by another version of Asperity')
    end subroutine check_count

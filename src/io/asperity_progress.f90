@@ -12,7 +12,7 @@ module asperity_progress
    public :: progress_type, progress_line, duration_text
 
    real(dp), parameter :: terminal_interval = 0.2_dp  !! least time between lines on a terminal, s
-   real(dp), parameter :: plain_interval = 10.0_dp    !! elsewhere, s
+   real(dp), parameter :: plain_interval = 10.0_dp    !! the same elsewhere, s
    integer, parameter :: standard_error = 2           !! its descriptor
 
    !> The progress of one run.
@@ -24,8 +24,8 @@ module asperity_progress
       integer :: rows = 0                             !! of the whole history
       integer :: first_step = 0                       !! the first row of this run
       integer :: shown_length = 0                     !! characters of the line on the terminal
-      real(dp) :: started = 0.0_dp                    !! s
-      real(dp) :: shown = 0.0_dp                      !! s
+      real(dp) :: started = 0.0_dp                    !! when the run started, on the clock of `seconds_now`, s
+      real(dp) :: shown = 0.0_dp                      !! when a line was shown last, s
       type(history_row_type) :: row                   !! the last one
    contains
       procedure :: start

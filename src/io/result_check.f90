@@ -12,7 +12,7 @@ module result_check
 
    public :: damage_type, find_damage
 
-   real(dp), parameter :: most_bytes = 2.0_dp**30   !! of fields that are read, 8 bytes a value
+   real(dp), parameter :: most_bytes = 2.0_dp**30   !! of fields that are read, 8 bytes per value
 
    !> The damage that was found.
    type :: damage_type

@@ -102,7 +102,7 @@ contains
       if (allocated(error)) call give_up(self, error)
    end subroutine create_result
 
-   !> Write a slab of the height map as it is before any sliding. The slabs have `height_rows` rows; the last one
+   !> Write a slab of the height map as it is before any sliding. The slabs have `slab_rows(nx)` rows; the last one
    !> may have fewer.
    subroutine write_height_rows(self, first, height, error)
       class(result_file_type), intent(inout) :: self
@@ -136,7 +136,7 @@ contains
    !> does not know the other one.
    subroutine give_up(self, error)
       class(result_file_type), intent(inout) :: self
-      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+      type(error_type), allocatable, intent(inout) :: error   !! the fault, which is set
       character(:), allocatable :: temporary
 
       call self%writer%finish(self%file)
@@ -180,7 +180,7 @@ contains
       class(result_file_type), intent(inout) :: self
       character(*), intent(in) :: name
       character(:), allocatable, intent(out) :: value
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(out), optional :: error
 
       value = ''
       if (self%file%has_attribute('/', name)) call self%file%read_attribute('/', name, value, error)
@@ -359,9 +359,9 @@ contains
       self%path = trim(path)
       self%compression = compression
       self%xdmf_path = sibling_path(path, '.xdmf')
-      call self%file%open(self%path, 'append', error)
-      if (allocated(error)) return
-      call self%read_text('id', self%id, error)
+      call self%file%open(self%path, 'append')
+      call self%read_text('id', self%id)
+      call self%report(error)
       if (.not. allocated(error) .and. self%id /= id) call fail(error, error_input, self%path// &
          ': is not the result that '//checkpoint_path(path)//' belongs to')
       call go_back(self%file, last_step, self%grid, self%expected_rows, self%snapshots%written, error)

@@ -6,6 +6,7 @@
 !> wrote them.
 module result_target
    use asperity_errors, only : error_file, error_type, fail
+   use asperity_precision, only : dp
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
    use file_system, only : file_exists, folder_of, is_folder
    use hdf5_file, only : hdf5_file_type
@@ -41,7 +42,6 @@ contains
          call fail(error, error_file, path//': is a link that leads to no file')
       end if
       do n = 1, side_files
-         if (allocated(error)) return
          call check_side_file(path, side_file(path, n), n, error)
       end do
    end subroutine check_place
@@ -50,10 +50,11 @@ contains
    subroutine check_side_file(path, name, n, error)
       character(*), intent(in) :: path, name
       integer, intent(in) :: n                  !! number of the side file
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       character(:), allocatable :: start
       logical :: ours
 
+      if (allocated(error)) return
       if (is_other_than_file(name) .or. is_dangling_link(name)) then
          call fail(error, error_file, name//': belongs to the result '//path// &
             ', and what is there is not a regular file')
@@ -196,7 +197,7 @@ contains
       type(error_type), allocatable :: error
       character(256), allocatable :: names(:), fields(:)
       character(:), allocatable :: text
-      real(kind(1.0d0)), allocatable :: column(:)
+      real(dp), allocatable :: column(:)
       integer, allocatable :: extent(:)
       integer :: i, j, number
 

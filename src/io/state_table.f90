@@ -36,7 +36,7 @@ module state_table
       real(dp), pointer :: real_3(:, :, :) => null()
       character(:), pointer :: text => null()
       integer :: row = 0                    !! values of a row of the grid; 0: not shared by rows
-      logical :: by_cells = .false.         !! the first dimension counts all cells, else the last one rows
+      logical :: by_cells = .false.         !! the first dimension counts cells; otherwise the last one counts rows
    contains
       procedure :: is_finite
       procedure :: extent
@@ -265,7 +265,6 @@ contains
    pure function layers(self)
       class(state_piece_type), intent(in) :: self
       integer :: layers
-
       integer, allocatable :: extent(:)
 
       layers = 1

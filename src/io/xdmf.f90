@@ -113,7 +113,7 @@ contains
       character(*), intent(in) :: name
       character(*), intent(in) :: place     !! file:/path/of/dataset
       type(grid_type), intent(in) :: grid
-      logical, intent(in) :: byte           !! whole numbers of one byte, else reals of eight
+      logical, intent(in) :: byte           !! true for whole numbers of one byte, false for reals of eight
       integer, intent(out) :: status
       character(*), intent(inout) :: reason
       character(:), allocatable :: kind
