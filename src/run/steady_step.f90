@@ -27,7 +27,7 @@ module steady_step
    use asperity_schedule, only : planned_row_type
    use solver_result, only : solver_result_type
    use rubber_kernels, only : normal_kernel, tangential_kernel
-   use steady_contact, only : steady_contact_type
+   use steady_contact, only : sliding_outcome_type, steady_contact_type
    use steady_friction, only : new_steady_friction, steady_friction_type
    use steady_losses, only : steady_losses_type, sum_losses
    use steady_memory, only : book_memory, remember_field
@@ -168,6 +168,7 @@ contains
       type(solver_result_type), intent(out) :: rubbing   !! of the traction
       type(steady_symbols_type) :: symbols
       type(normal_problem_type) :: problem
+      type(sliding_outcome_type) :: both
 
       self%medium%velocity = plan%velocity
       self%medium%dt = self%scheme_dt
@@ -187,7 +188,9 @@ contains
       if (self%frictional) then
          self%coupled%direction = self%medium%velocity/norm2(self%medium%velocity)
          self%coupled%base = self%base
-         call self%coupled%solve(self%operator, problem, road, self%contact, outcome, rubbing)
+         call self%coupled%solve(self%operator, problem, road, self%contact, both)
+         outcome = both%normal
+         rubbing = both%rubbing
          if (.not. outcome%stopped) call add_mean_shear(self)
       else
          call self%normal%solve(self%operator, problem, self%contact%height, self%contact%pressure, &

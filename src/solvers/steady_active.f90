@@ -2,10 +2,10 @@
 !>
 !> With a guess C of the cells in contact, P follows from K P = H + level on C and the load. This is a dense
 !> system, whose entries come from the displacement caused by one loaded cell. Cells with P < 0 leave C, and cells
-!> that overlap join it, until C does not change any more. For few cells the system is cheap, and the splitting
-!> of `steady_normal` is slow in such cases: small patches far apart, or a summit on a tall map. Near the
-!> solution a few rounds are sufficient. There is no proof that C settles, and from a distant guess it
-!> oscillates. The attempt therefore ends as soon as it does not come closer, and the caller continues.
+!> that overlap the road join it, until C does not change any more. For few cells the system is cheap, whereas the
+!> splitting of `steady_normal` is slow in such cases, for example with small patches far apart, or with the summit of a
+!> tall map. Near the solution a few rounds are sufficient. There is no proof that C settles, and from a distant guess
+!> it oscillates. The attempt therefore ends if it does not come closer in `patience` rounds, and the caller continues.
 !>
 !> The matrix is factored for the first guess. Cells that leave or join later change the solution by a
 !> small system of their own (module `changed_set`), which makes the rounds after the first cheap.
@@ -23,7 +23,7 @@ module steady_active
    integer, parameter :: most_rounds = 30        !! rounds in which cells join
    integer, parameter :: most_departures = 12    !! times that cells leave within a round
    integer, parameter :: most_factors = 4        !! factorisations of the matrix in an attempt
-   integer, parameter :: patience = 6            !! rounds that need not come closer
+   integer, parameter :: patience = 6            !! an attempt ends after more rounds that do not come closer
 
 contains
 
@@ -32,9 +32,10 @@ contains
       real(dp), intent(in) :: cells_in_contact, cells
       integer, intent(in) :: transforms                !! real transforms since the solve began
       logical :: cheap
-      real(dp), parameter :: factoring = 3.0_dp        !! measured: m^3 of a factoring over n log2(n) of a transform
-      real(dp), parameter :: part = 0.25_dp            !! of the time so far
-      real(dp), parameter :: fields = 16.0_dp          !! memory of the matrix
+      !> Measured: in the time of a transform over its n log2(n), a factorisation does this number of its m^3.
+      real(dp), parameter :: factoring = 3.0_dp
+      real(dp), parameter :: part = 0.25_dp            !! largest time of a factorisation over the time so far
+      real(dp), parameter :: fields = 16.0_dp          !! largest memory of the matrix, in fields
       real(dp) :: m, n
 
       m = cells_in_contact

@@ -5,13 +5,14 @@
 !>
 !>     T = bound(T + c_t r)
 !>
-!> where bound(w) is the traction on the bound from which w - T is a slip that the law allows. Where w
-!> lies within the bound, T = w: the cell sticks. On the flat, bound(w) = w min(1, F/|w|). With slope,
-!> M r is parallel to D = T - T* with M = 1 + grad H grad H^T, so that
+!> where bound(w) is the traction T on the bound for which w - T has a direction of slip that the law allows. If w lies
+!> within the bound, T = w, and the cell sticks. Without slope effect bound(w) = w min(1, F/|w|), where F is the largest
+!> friction force. With slope effect the bound is about T* = -P grad H, and M r is parallel to D = T - T* with
+!> M = 1 + grad H grad H^T, so that
 !>
 !>     D = (M + l)^-1 M (w - T*),   l >= 0 such that D lies on the bound.
 !>
-!> With the thesis's direction of slip r is parallel to D, and D is w - T* shortened to the bound.
+!> With the thesis's direction of slip, r is parallel to D, and D is w - T* shortened to the bound.
 module steady_bound
    use friction_law, only : friction_law_type
    use asperity_precision, only : dp
@@ -25,7 +26,7 @@ module steady_bound
 
 contains
 
-   !> T = bound(start + c r) where P > 0, and zero elsewhere.
+   !> Compute T = bound(start + c r) where P > 0, and zero elsewhere.
    subroutine bound_tractions(law, c, pressure, slope_x, slope_y, start, slip, traction)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: c                        !! c_t, Pa
@@ -54,7 +55,8 @@ contains
       end do
    end subroutine bound_tractions
 
-   !> The unit of a traction. While the pressure changes, the ratio of the traction to this unit is kept.
+   !> The unit of a traction: the pressure, or the strength if the traction jumps at the edge of the contact. While the
+   !> pressure changes, the ratio of the traction to this unit is kept.
    pure function unit_of(law, pressure) result(unit)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: pressure
@@ -64,7 +66,7 @@ contains
       if (law%jumps_at_edge()) unit = law%bare_strength()
    end function unit_of
 
-   !> Compute the ratio T/unit of every cell. Without pressure the ratio does not change.
+   !> Compute the ratio of the traction to its unit in every cell. Without pressure the ratio does not change.
    subroutine compare_tractions(law, pressure, traction, ratio)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: pressure(:, :)
@@ -127,7 +129,8 @@ contains
          high = 4.0_dp*high
       end do
       do k = 1, bisections
-         ! s grows almost linearly with l, unless it has no bound at the upper end.
+         ! s increases almost linearly with l, unless the traction has no bound at the upper end, where s is then huge.
+         ! Every third step bisects, so that the bracket shrinks in any case.
          l = 0.5_dp*(low + high)
          if (s_high < 1e3_dp .and. mod(k, 3) /= 0) l = low + (high - low)*(1.0_dp - s_low)/(s_high - s_low)
          d = across/(1.0_dp + l) + along*(stretch/(stretch + l))

@@ -1,5 +1,5 @@
-!> A contact in steady sliding with friction: its fields, the road under it, and the reasons why there may be no
-!> solution.
+!> A contact in steady sliding with friction: its fields, the road under it, the outcome of a solve, and the reasons
+!> why there may be no solution.
 module steady_contact
    use asperity_interpolation, only : displaced, interpolation_type
    use asperity_precision, only : dp
@@ -11,7 +11,7 @@ module steady_contact
    implicit none
    private
 
-   public :: contact_mean, explain, judge_gap, read_road, steady_contact_type
+   public :: contact_mean, explain, judge_gap, read_road, sliding_outcome_type, steady_contact_type
 
    !> A steady contact with friction.
    type :: steady_contact_type
@@ -26,12 +26,36 @@ module steady_contact
       real(dp) :: offset(2) = 0.0_dp                   !! mean displacement of the contact, m
    end type steady_contact_type
 
+   !> The outcome of a solve with friction.
+   type :: sliding_outcome_type
+      type(solver_result_type) :: normal               !! iterations, error of the pressure
+      type(solver_result_type) :: rubbing              !! rounds, error of the traction
+   contains
+      procedure :: converged
+      procedure :: residual
+   end type sliding_outcome_type
+
 contains
 
-   !> Compute the road at x + u, where u is A_T T minus its mean over the contact, and r. In: slip holds
-   !> d(A_T T)/ds.
+   !> Have both the pressure and the traction converged?
+   pure function converged(self) result(yes)
+      class(sliding_outcome_type), intent(in) :: self
+      logical :: yes
+
+      yes = self%normal%converged .and. self%rubbing%converged
+   end function converged
+
+   !> The larger one of the errors of the pressure and of the traction.
+   pure function residual(self) result(error)
+      class(sliding_outcome_type), intent(in) :: self
+      real(dp) :: error
+
+      error = max(self%normal%residual, self%rubbing%residual)
+   end function residual
+
+   !> Compute the road at x + u, where u is A_T T minus its mean over the contact, and the slip r.
    subroutine read_road(contact, road, base, direction)
-      type(steady_contact_type), intent(inout) :: contact
+      type(steady_contact_type), intent(inout) :: contact   !! in: the slip holds d(A_T T)/ds; out: r
       type(interpolation_type), intent(inout) :: road
       real(dp), intent(in) :: base(2)                  !! displacement of the road, m
       real(dp), intent(in) :: direction(2)             !! e
@@ -46,7 +70,7 @@ contains
          contact%slope_y)
    end subroutine read_road
 
-   !> The gap of a pressure over the road as it was read, and the error of the pressure.
+   !> Compute the gap of a pressure over the road that was read last, and the error of the pressure.
    subroutine judge_gap(contact, operator, task, normal)
       type(steady_contact_type), intent(inout) :: contact
       type(steady_operator_type), intent(inout) :: operator
@@ -65,7 +89,7 @@ contains
       if (normal%converged) normal%reason = reason_converged
    end subroutine judge_gap
 
-   !> Mean of the displacement weighted by the pressure.
+   !> The mean of the displacement, weighted by the pressure.
    function contact_mean(contact) result(mean)
       type(steady_contact_type), intent(in) :: contact
       real(dp) :: mean(2)
@@ -84,24 +108,25 @@ contains
       mean = sums(1:2)/max(sums(3), tiny(1.0_dp))
    end function contact_mean
 
-   !> Why there may be no solution. Uphill the law on the slope gives T = P tan(atan(mu) + alpha), which has
-   !> no bound where mu tan(alpha) reaches 1: the road wedges. A strength bounds the traction of all laws that
-   !> have one, and a solution exists; with constant shear the solver may miss it, because the traction jumps
-   !> at the edge of the contact.
-   subroutine explain(contact, law, normal, rubbing)
+   !> Say why there may be no solution. On a slope of angle alpha the law allows T = P tan(atan(mu) + alpha) uphill,
+   !> which has no bound if mu tan(alpha) reaches 1: the road wedges. If the law has a strength, it bounds the traction,
+   !> and a solution exists. With constant shear the solver may not find it, because the traction jumps at the edge of
+   !> the contact.
+   subroutine explain(contact, law, outcome)
       type(steady_contact_type), intent(in) :: contact
       type(friction_law_type), intent(in) :: law
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
 
-      if (normal%converged .and. rubbing%converged) return
+      if (outcome%converged()) return
       if (law%jumps_at_edge()) then
-         normal%reason = 'cells at the edge of the contact open and close in turn; try law = ''coulomb_orowan'''
+         outcome%normal%reason = &
+            'cells at the edge of the contact open and close in turn; try law = ''coulomb_orowan'''
       else if (law%slope .and. law%strength_beside() < 0.0_dp) then
          if (field_count(contact%pressure > 0.0_dp .and. law%reach_coefficient()*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &
-            normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
+            outcome%normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
       end if
-      rubbing%reason = normal%reason
+      outcome%rubbing%reason = outcome%normal%reason
    end subroutine explain
 
 end module steady_contact

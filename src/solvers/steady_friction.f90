@@ -1,26 +1,29 @@
-!> Steady sliding with friction: pressure, traction and the road under the displaced rubber at once.
+!> Steady sliding with friction: the pressure, the traction, and the road under the displaced rubber, solved together.
 !>
-!> The unknowns are the state z of the normal solver (module `steady_normal`), the displacement u with which
-!> the road is read, and the slip r = e + du/ds. One round of the iteration is
+!> The unknowns are the state z of the normal solver (module `steady_normal`), the displacement u at which the road is
+!> read, and the slip r = e + du/ds, where e is the direction of the motion of the road and d/ds the derivative along
+!> it. One round of the iteration is
 !>
 !>     P = pressure of z;   T = bound(P (T/P) + c_t r)                      (module steady_bound)
 !>     u' = A_T T - offset;   r' = e + d(A_T T)/ds                          six transforms
-!>     u+ = u + beta (u' - u);   read the road at x + u+: H, grad H
-!>     z+ = some plain steps of the normal solver under H                   two transforms each
+!>     u+ = u + beta (u' - u);   r+ = r + beta (r' - r)
+!>     read the road at x + u+: H, grad H
+!>     z+ = some plain steps of the normal solver on H                      two transforms each
 !>
-!> The offset is the mean of A_T T weighted by P: the road is read relative to the mean displacement of
-!> the contact, so that the contact stays where it is on the grid. What is left out, `offset`, is how
-!> much further the road stands. With slope, T holds -P grad H, which makes the passes over u return with
-!> a factor of -(1..2) |grad H|^2: hence the relaxation by beta. Near the solution Anderson acceleration
-!> of (z, u) finishes; r is carried along. From the start it diverges.
+!> The offset is the mean of A_T T weighted by P. The road is read relative to this mean displacement, so that the
+!> contact stays where it is on the grid; the caller moves the road by the offset afterwards. With the slope effect T
+!> contains -P grad H, which contributes eigenvalues of about -(1..2) |grad H|^2 to du'/du. The relaxation by beta damps
+!> them. Near the solution Anderson acceleration of (z, u) takes over, and r is combined with the same coefficients. Far
+!> from the solution the acceleration diverges (module `steady_pace`).
 !>
-!> Converged means: the duality gap of P under the road at x + u, u = A_T T of the traction handed out,
-!> and |bound(T + c_t r) - T|/|T|, all recomputed, are below the tolerance (module `steady_judge`).
+!> A contact has converged if the duality gap of P on the road at x + u, with u = A_T T of the final traction, and
+!> |bound(T + c_t r) - T|/|T| are below the tolerance. Both are recomputed from P and T (module `steady_judge`).
 !>
-!> Where the rounds stall, all cells are solved at once from the contact of the least error (module
-!> `steady_joint`). If that fails, too, this contact is handed out.
+!> If the rounds stall, all cells are solved at once, starting from the contact of the least error or on a path from the
+!> contact without friction (module `steady_joint`). If that fails, too, the result is the contact of the least error.
 !>
-!> Memory beside the caller's: 19 fields, 50 for the acceleration in single precision, and 10 of doubles.
+!> Memory beside the caller's fields, in fields of doubles: 21, 60 for the acceleration of the rounds, and 8 for that of
+!> the normal solver.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
    use field_sums, only : field_count, field_mean, field_sum, row_total
@@ -33,7 +36,7 @@ module steady_friction
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
-   use steady_contact, only : contact_mean, explain, steady_contact_type
+   use steady_contact, only : contact_mean, explain, sliding_outcome_type, steady_contact_type
    use steady_joint, only : steady_joint_type
    use steady_judge, only : new_sliding, ratio_of_lengths, sliding_type
    use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
@@ -47,13 +50,14 @@ module steady_friction
 
    integer, parameter :: pairs = 10              !! of the acceleration
    integer, parameter :: doubtful = 100          !! rounds after which the best contact is kept
-   integer, parameter :: looks = 25              !! rounds between two checks of it
+   integer, parameter :: check_every = 25        !! rounds between two checks whether a contact is the best
+   real(dp), parameter :: scale_of_slip = 5.0_dp !! c_t over the largest friction force of the mean pressure in contact
 
    !> Work fields. A variable of this type must not be copied.
    type, extends(sliding_type) :: steady_friction_type
       type(steady_normal_type) :: normal
       real(dp), allocatable, private :: state(:, :, :)     !! z, u, r [nx, 5, rows]
-      real(dp), allocatable, private :: residual(:, :, :)
+      real(dp), allocatable, private :: residual(:, :, :)  !! change of the state by a round
       real(dp), allocatable, private :: place(:, :, :)     !! u+, m [nx, 2, rows]
       type(anderson_type), private :: memory
       type(steady_joint_type), private :: joint
@@ -78,85 +82,79 @@ contains
       call new_anderson(self%memory, grid%nx, components, rows, pairs)
    end subroutine new_steady_friction
 
-   !> Solve for the steady state over a road. Not converging is an outcome.
-   subroutine solve(self, operator, problem, road, contact, normal, rubbing)
+   !> Solve for the steady state on a road. Not converging is an outcome.
+   subroutine solve(self, operator, problem, road, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator    !! with its symbols set
-      type(normal_problem_type), intent(in) :: problem         !! warm: pressure, gap, traction are a start
-      type(interpolation_type), intent(inout) :: road
+      type(steady_operator_type), intent(inout), target :: operator   !! with its symbols set
+      type(normal_problem_type), intent(in) :: problem     !! if warm, pressure, gap and traction are a start
+      type(interpolation_type), intent(inout), target :: road
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(out) :: normal          !! iterations, error of the pressure
-      type(solver_result_type), intent(out) :: rubbing         !! rounds, error of the traction
-      type(normal_problem_type) :: task
+      type(sliding_outcome_type), intent(out) :: outcome
       type(steady_measure_type) :: measure
       type(pace_type) :: pace
-      real(dp) :: change
+      real(dp) :: change, largest
       integer(int64) :: before
       logical :: determined
 
       before = operator%ffts
-      call prepare_problem(problem, self%grid, operator%threads, contact%height, task, determined)
-      call begin(self, operator, task, road, contact, normal)
-      if (normal%stopped) return
-      pace%accepted = task%tolerance
-      normal%reason = reason_iterations
-      rubbing%reason = reason_iterations
+      self%operator => operator
+      self%road => road
+      call prepare_problem(problem, self%grid, operator%threads, contact%height, self%task, determined)
+      call begin(self, contact, outcome%normal)
+      if (outcome%normal%stopped) return
+      pace%accepted = self%task%tolerance
+      outcome%normal%reason = reason_iterations
+      outcome%rubbing%reason = reason_iterations
       do
-         call round(self, operator, task, road, pace, contact, measure, change)
-         rubbing%iterations = rubbing%iterations + 1
-         normal%iterations = normal%iterations + pace%inner
-         normal%stopped = stop_is_due()
-         if (normal%stopped) return
-         if (max(change, measure%change/measure%size) <= pace%accepted .and. &
-            measure%error <= task%tolerance) then
-            call examine(self, operator, task, road, contact, normal, rubbing)
-            if (normal%converged .and. rubbing%converged) exit
+         call round(self, pace, contact, measure, change)
+         largest = max(change, measure%change/measure%size)
+         outcome%rubbing%iterations = outcome%rubbing%iterations + 1
+         outcome%normal%iterations = outcome%normal%iterations + pace%inner
+         outcome%normal%stopped = stop_is_due()
+         if (outcome%normal%stopped) return
+
+         if (largest <= pace%accepted .and. measure%error <= self%task%tolerance) then
+            call examine(self, contact, outcome)
+            if (outcome%converged()) exit
             pace%accepted = 0.5_dp*pace%accepted
          end if
-         if (rubbing%iterations >= task%max_iterations) then
-            normal%reason = reason_iterations
-            rubbing%reason = reason_iterations
-            call finish(self, operator, task, road, contact, normal, rubbing)
-            call self%return_to_best(operator, task, road, pace%best, contact, normal, rubbing)
-            call explain(contact, self%law, normal, rubbing)
+         if (outcome%rubbing%iterations >= self%task%max_iterations) then
+            call give_up(self, pace, contact, outcome)
             exit
          end if
-         if (rubbing%iterations >= doubtful .and. mod(rubbing%iterations, looks) == 0) &
-            call keep_best(self, operator, task, road, pace, contact)
-         call pace%choose_attempt(rubbing%iterations, max(change, measure%change/measure%size), task%tolerance, &
-            self%grid%cells(), self%law%jumps_at_edge())
+
+         if (outcome%rubbing%iterations >= doubtful .and. mod(outcome%rubbing%iterations, check_every) == 0) &
+            call keep_best(self, pace, contact)
+         call pace%choose_attempt(outcome%rubbing%iterations, largest, self%task%tolerance, self%grid%cells(), &
+            self%law%jumps_at_edge())
          if (pace%attempt /= no_attempt) then
-            call solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
-            if (normal%stopped .or. (normal%converged .and. rubbing%converged)) exit
+            call solve_at_once(self, pace, contact, outcome)
+            if (outcome%normal%stopped .or. outcome%converged()) exit
          end if
-         call advance(self, operator, task, pace, rubbing%iterations, &
-            max(change, measure%change/measure%size), measure)
+         call advance(self, pace, outcome%rubbing%iterations, largest, measure)
       end do
-      normal%ffts = operator%ffts - before
+      outcome%normal%ffts = operator%ffts - before
    end subroutine solve
 
-   !> Make the first state from the given one, or from the frictionless solution.
-   subroutine begin(self, operator, task, road, contact, normal)
+   !> Make the first state from the given contact, or from the solution without friction.
+   subroutine begin(self, contact, normal)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: normal
       integer :: c
 
       call self%memory%forget()
       call ratio_of_sliding(self%law, self%direction, self%ratio)
-      if (task%warm) then
-         call self%normal%start(operator, task, contact%height, contact%pressure, contact%gap)
-         call operator%shear(contact%traction, contact%displacement, contact%slip)
+      if (self%task%warm) then
+         call self%normal%start(self%operator, self%task, contact%height, contact%pressure, contact%gap)
+         call self%operator%shear(contact%traction, contact%displacement, contact%slip)
          contact%offset = contact_mean(contact)
-         call displaced(road, self%base(1) + contact%offset(1), self%base(2) + contact%offset(2), &
+         call displaced(self%road, self%base(1) + contact%offset(1), self%base(2) + contact%offset(2), &
             contact%displacement(:, 1, :), contact%displacement(:, 2, :), contact%height, &
             contact%slope_x, contact%slope_y)
          call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       else
-         call contact_without_friction(self%normal, operator, task, contact, normal)
+         call contact_without_friction(self%normal, self%operator, self%task, contact, normal)
          if (normal%stopped) return
       end if
       self%state(:, 1, :) = self%normal%z
@@ -164,16 +162,13 @@ contains
          self%state(:, 1 + c, :) = contact%displacement(:, c, :) - contact%offset(c)
          self%state(:, 3 + c, :) = self%direction(c) + contact%slip(:, c, :)
       end do
-      self%c = 5.0_dp*largest_force(self%law, field_sum(contact%pressure) &
+      self%c = scale_of_slip*largest_force(self%law, field_sum(contact%pressure) &
          /max(field_count(contact%pressure > 0.0_dp), 1.0_dp))
    end subroutine begin
 
    !> Do one round: compute the residual of the state. The contact receives P, T, A_T T and the road at u+.
-   subroutine round(self, operator, task, road, pace, contact, measure, change)
+   subroutine round(self, pace, contact, measure, change)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(pace_type), intent(in) :: pace
       type(steady_contact_type), intent(inout) :: contact
       type(steady_measure_type), intent(out) :: measure    !! of the last normal step
@@ -182,11 +177,11 @@ contains
       integer :: c, j, k
 
       contact%pressure(:, :) = self%state(:, 1, :)
-      call project_simplex(contact%pressure, task%target*self%grid%cells())
+      call project_simplex(contact%pressure, self%task%target*self%grid%cells())
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
          self%ratio, self%state(:, 4:5, :), contact%traction)
       call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
-      call operator%shear(contact%traction, contact%displacement, contact%slip)
+      call self%operator%shear(contact%traction, contact%displacement, contact%slip)
       contact%offset = contact_mean(contact)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, contact, pace, c) private(j)
@@ -199,95 +194,99 @@ contains
          end do
       end do
       change = relative_change(self, pace%beta)
-      call read_place(self, road, contact)
+      call read_place(self, contact)
       mean = field_mean(contact%height)
       self%normal%z(:, :) = self%state(:, 1, :)
       do k = 1, pace%inner
-         call self%normal%evaluate(operator, task, contact%height, mean, self%normal%z, measure)
+         call self%normal%evaluate(self%operator, self%task, contact%height, mean, self%normal%z, measure)
          self%normal%z = self%normal%z + self%normal%residual
       end do
       self%residual(:, 1, :) = self%normal%z - self%state(:, 1, :)
    end subroutine round
 
    !> Read the road at u+.
-   subroutine read_place(self, road, contact)
-      class(steady_friction_type), intent(in) :: self
-      type(interpolation_type), intent(inout) :: road
+   subroutine read_place(self, contact)
+      class(steady_friction_type), intent(inout) :: self
       type(steady_contact_type), intent(inout) :: contact
 
-      call displaced(road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
+      call displaced(self%road, self%base(1), self%base(2), self%place(:, 1, :), self%place(:, 2, :), &
          contact%height, contact%slope_x, contact%slope_y)
    end subroutine read_place
 
-   !> Complete the present contact and compute its errors. If it has not converged, the road and T/P are what they were
-   !> before, so that the check does not affect the rounds.
-   subroutine examine(self, operator, task, road, contact, normal, rubbing)
+   !> Complete the present contact and compute its errors. If it has not converged, the road and the ratio of the traction
+   !> are restored, so that the check does not affect the rounds.
+   subroutine examine(self, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
       real(dp), allocatable :: ratio(:, :, :)
 
       allocate (ratio, source=self%ratio)
-      call finish(self, operator, task, road, contact, normal, rubbing)
-      if (normal%converged .and. rubbing%converged) return
+      call complete(self, contact, outcome)
+      if (outcome%converged()) return
       self%ratio(:, :, :) = ratio
-      call read_place(self, road, contact)
+      call read_place(self, contact)
    end subroutine examine
 
    !> Compute the error of the present contact, and keep the contact if it is the best so far.
-   subroutine keep_best(self, operator, task, road, pace, contact)
+   subroutine keep_best(self, pace, contact)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(pace_type), intent(inout) :: pace
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type) :: normal, rubbing
+      type(sliding_outcome_type) :: outcome
 
-      call examine(self, operator, task, road, contact, normal, rubbing)
-      call self%keep(max(normal%residual, rubbing%residual), contact, pace%best)
+      call examine(self, contact, outcome)
+      call self%keep(outcome%residual(), contact, pace%best)
    end subroutine keep_best
 
-   !> Solve all cells at once, from the present contact, from the best one, or from that without friction: on steep
-   !> roads the best one may be far off. If this fails, the rounds continue unchanged.
-   subroutine solve_at_once(self, operator, task, road, pace, contact, normal, rubbing)
+   !> End the rounds after the largest number, with the best contact, and say why there may be no solution.
+   subroutine give_up(self, pace, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(pace_type), intent(in) :: pace
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
+
+      outcome%normal%reason = reason_iterations
+      outcome%rubbing%reason = reason_iterations
+      call complete(self, contact, outcome)
+      call self%return_to_best(pace%best, contact, outcome)
+      call explain(contact, self%law, outcome)
+   end subroutine give_up
+
+   !> Solve all cells at once, starting from the present contact, from the best one, or from that without friction,
+   !> because on steep roads the best one may be far from the solution. If this fails, the rounds continue unchanged.
+   subroutine solve_at_once(self, pace, contact, outcome)
+      class(steady_friction_type), intent(inout) :: self
+      type(pace_type), intent(in) :: pace
+      type(steady_contact_type), intent(inout) :: contact
+      type(sliding_outcome_type), intent(inout) :: outcome
       type(solver_result_type) :: start
       real(dp), allocatable :: ratio(:, :, :)
       real(dp) :: scale
 
       allocate (ratio, source=self%ratio)
       scale = self%normal%c
-      call finish(self, operator, task, road, contact, normal, rubbing)
-      if (pace%attempt /= from_here) call self%return_to_best(operator, task, road, pace%best, contact, normal, rubbing)
+      call complete(self, contact, outcome)
+      if (pace%attempt /= from_here) call self%return_to_best(pace%best, contact, outcome)
       if (pace%attempt == along_path .or. pace%attempt == along_second_path) then
-         call shifted(road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
-         call contact_without_friction(self%normal, operator, task, contact, start)
-         normal%stopped = start%stopped
-         if (normal%stopped) return
+         call shifted(self%road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
+         call contact_without_friction(self%normal, self%operator, self%task, contact, start)
+         outcome%normal%stopped = start%stopped
+         if (outcome%normal%stopped) return
          call full_sliding(self%law, self%c, self%direction, self%ratio, contact)
       end if
       self%joint%direction = self%direction
       self%joint%base = self%base
       self%joint%c = self%c
       self%joint%attempt = pace%attempt
-      call self%joint%solve(self%law, operator, task, road, contact, normal, rubbing)
-      if (normal%stopped .or. (normal%converged .and. rubbing%converged)) return
+      call self%joint%solve(self%law, self%operator, self%task, self%road, contact, outcome)
+      if (outcome%normal%stopped .or. outcome%converged()) return
 
-      ! The next round needs the scale and the road as they were.
+      ! The next round needs the scale of the normal solver, the ratio of the traction and the road as before.
       self%normal%c = scale
-      call operator%set_scale(scale)
+      call self%operator%set_scale(scale)
       self%ratio(:, :, :) = ratio
-      call read_place(self, road, contact)
+      call read_place(self, contact)
    end subroutine solve_at_once
 
    !> |u' - u|/|u'|, from the relaxed change.
@@ -307,10 +306,8 @@ contains
    end function relative_change
 
    !> Compute the next state by a relaxed or an accelerated step, and decide how the rounds continue.
-   subroutine advance(self, operator, task, pace, rounds, change, measure)
+   subroutine advance(self, pace, rounds, change, measure)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
       type(pace_type), intent(inout) :: pace
       integer, intent(in) :: rounds
       real(dp), intent(in) :: change
@@ -332,7 +329,7 @@ contains
       end if
       if (.not. any(rounds == [8, 16, 32, 64])) return
       self%normal%z(:, :) = self%state(:, 1, :)
-      call self%normal%rescale(operator, task, measure%scale, changed)
+      call self%normal%rescale(self%operator, self%task, measure%scale, changed)
       if (.not. changed) return
       self%state(:, 1, :) = self%normal%z
       call self%memory%forget()
@@ -352,17 +349,15 @@ contains
       length = sqrt(row_total(rows))
    end function length_of
 
-   !> Complete the result: P, T within its bound, and all fields that follow from them.
-   subroutine finish(self, operator, task, road, contact, normal, rubbing)
+   !> Complete the present contact: take the pressure of the normal solver, return T to its bound, and compute all fields
+   !> that follow from both, and the errors.
+   subroutine complete(self, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
 
       contact%pressure(:, :) = self%normal%pressure
-      call self%bound_and_judge(operator, task, road, contact, normal, rubbing)
-   end subroutine finish
+      call self%bound_and_judge(contact, outcome)
+   end subroutine complete
 
 end module steady_friction

@@ -1,9 +1,9 @@
 !> Solves a state of steady sliding with friction for all cells at once, if the rounds of `steady_friction` stall.
 !>
-!> The equations are those of module `joint_system` with U_z = K P, the road read at x + A_T T, and the slip
-!> r |V|. They contain the third state of a cell, between open and in contact, so that constant shear is
-!> solved in its closed form: without a gap and without pressure, a cell may carry a share of the strength.
-!> Its traction then has no jump at the edge of the contact, where the plain law often has no solution.
+!> The equations are those of module `joint_system` with U_z = K P, the road read at x + A_T T, and the slip speed
+!> r |V|. With constant shear they contain a third state of a cell, between open and in contact: without a gap and
+!> without pressure, a cell may carry a share of the strength. The traction then has no jump at the edge of the
+!> contact. With the jump there is often no solution.
 !>
 !> Newton's method starts from a contact that is near the solution, or follows a path of solutions (`follow_path`).
 !> An evaluation takes eight transforms. GMRES uses an approximate inverse on the cells in contact (module
@@ -19,8 +19,7 @@ module steady_joint
    use joint_system, only : joint_state_type, joint_system_type
    use normal_state, only : normal_problem_type, reason_converged
    use regular_grid, only : grid_type
-   use solver_result, only : solver_result_type
-   use steady_contact, only : judge_gap, read_road, steady_contact_type
+   use steady_contact, only : judge_gap, read_road, sliding_outcome_type, steady_contact_type
    use steady_inverse, only : contact_inverse_type
    use steady_operator, only : steady_operator_type
    use steady_pace, only : along_path, along_second_path, from_here, no_attempt
@@ -30,11 +29,13 @@ module steady_joint
 
    public :: steady_joint_type
 
-   integer, parameter :: near_evaluations = 1000       !! most of an attempt from the present contact
-   integer, parameter :: most_evaluations = 4000       !! most of another one, ...
+   integer, parameter :: near_evaluations = 1000       !! largest number in an attempt from the present contact
+   integer, parameter :: most_evaluations = 4000       !! largest number in any other attempt, ...
    real(dp), parameter :: large = 16384.0_dp           !! ... on grids of this number of cells
    real(dp), parameter :: most_on_small = 5.0_dp       !! factor by which it may be larger on smaller grids
-   real(dp), parameter :: accepted = 30.0_dp           !! tolerances with which a solution is first judged
+   !> Newton's method first solves to this number of tolerances. Its units differ from those of the errors, which often
+   !> meet the tolerance then.
+   real(dp), parameter :: accepted = 30.0_dp
    real(dp), parameter :: rough = 1.0e-2_dp            !! tolerance of the solutions along the path
    real(dp), parameter :: first_step = 0.25_dp         !! along the path
    real(dp), parameter :: growth = 1.5_dp              !! of a step that succeeded
@@ -75,18 +76,18 @@ module steady_joint
 contains
 
    !> Solve, starting from a contact. If this fails, the contact is undefined.
-   subroutine solve(self, law, operator, task, road, contact, normal, rubbing)
+   subroutine solve(self, law, operator, task, road, contact, outcome)
       class(steady_joint_type), intent(inout) :: self
       type(friction_law_type), intent(in) :: law
       type(steady_operator_type), intent(inout), target :: operator
       type(normal_problem_type), intent(in) :: task
       type(interpolation_type), intent(inout), target :: road
       type(steady_contact_type), intent(inout), target :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
       logical :: solved
 
-      normal%converged = .false.
-      rubbing%converged = .false.
+      outcome%normal%converged = .false.
+      outcome%rubbing%converged = .false.
       if (.not. self%ready) call prepare(self, operator%grid)
       if (.not. self%ready) return
       associate (system => self%system)
@@ -109,12 +110,12 @@ contains
          else
             call self%newton%solve(system, accepted*task%tolerance, solved)
          end if
-         if (solved) call hand_out(system, self%newton%now, task, normal, rubbing)
-         if (solved .and. .not. (normal%converged .and. rubbing%converged)) then
+         if (solved) call return_solution(system, self%newton%now, task, outcome)
+         if (solved .and. .not. outcome%converged()) then
             call self%newton%solve(system, task%tolerance, solved)
-            if (solved) call hand_out(system, self%newton%now, task, normal, rubbing)
+            if (solved) call return_solution(system, self%newton%now, task, outcome)
          end if
-         normal%stopped = stop_is_due()
+         outcome%normal%stopped = stop_is_due()
       end associate
    end subroutine solve
 
@@ -149,11 +150,11 @@ contains
          evaluations = nint(most_evaluations*min(max(sqrt(large/cells), 1.0_dp), most_on_small))
    end function budget
 
-   !> Follow the solutions while the part of the tangential displacement that counts grows from 0 to 1. Without it all
-   !> cells slide straight ahead under the pressure of the contact without friction, where the path begins. On a second
-   !> path the slip counts fully from the beginning, and only the part with which the road is read grows: either path
-   !> may turn back where the other one does not. Each solution is predicted by the straight line through the last
-   !> two. A step that does not succeed soon is halved.
+   !> Follow a path of solutions (continuation): only a part of the tangential displacement counts, and this part grows
+   !> from 0 to 1. At part 0 all cells slide along the motion of the road under the pressure of the contact without
+   !> friction, which is known. On the second path the slip counts fully from the beginning, and only the part of the
+   !> displacement with which the road is read grows: one path may turn back where the other one does not. Each solution
+   !> is predicted by the straight line through the last two. A step is halved if Newton's method does not succeed.
    subroutine follow_path(self, system, tolerance, solved)
       class(steady_joint_type), intent(inout) :: self
       class(steady_system_type), intent(inout) :: system
@@ -225,7 +226,7 @@ contains
       end do
    end subroutine extend_line
 
-   !> Set the units, and make the first state from that of the contact.
+   !> Set the units of the equations, and make the first state from the contact.
    subroutine start(system, begun)
       type(steady_system_type), intent(inout) :: system
       type(joint_state_type), intent(inout) :: begun
@@ -248,7 +249,7 @@ contains
       end associate
    end subroutine start
 
-   !> Displacements of a cell under its own unit pressure and traction, m/Pa.
+   !> Compute the displacements of a cell under its own unit pressure and under its own unit traction, m/Pa.
    subroutine find_softness(operator, soft, soft_along)
       type(steady_operator_type), intent(inout) :: operator
       real(dp), intent(out) :: soft, soft_along
@@ -283,10 +284,10 @@ contains
       call compare(self, self%contact, state)
    end subroutine evaluate
 
-   !> Compute the residuals of each cell, where U_z is in the place of the gap, and that of the load.
+   !> Compute the residuals of each cell, and that of the load.
    subroutine compare(self, contact, state)
       type(steady_system_type), intent(in) :: self
-      type(steady_contact_type), intent(in) :: contact
+      type(steady_contact_type), intent(in) :: contact      !! its gap holds U_z
       type(joint_state_type), intent(inout) :: state
       real(dp), allocatable :: rows(:, :), largest(:)
       real(dp) :: sums(2), share, slope(2), stretch
@@ -351,18 +352,18 @@ contains
    end subroutine improve
 
    !> Copy the solution to the contact, and compute its errors.
-   subroutine hand_out(system, found, task, normal, rubbing)
+   subroutine return_solution(system, found, task, outcome)
       type(steady_system_type), intent(inout) :: system
       type(joint_state_type), intent(inout) :: found
       type(normal_problem_type), intent(in) :: task
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
       real(dp), allocatable :: rows(:, :)
       real(dp) :: sums(2)
       integer :: j
 
       call system%evaluate(found)
-      associate (contact => system%contact, rules => system%rules)
-         call judge_gap(contact, system%operator, task, normal)
+      associate (contact => system%contact, rules => system%rules, rubbing => outcome%rubbing)
+         call judge_gap(contact, system%operator, task, outcome%normal)
          allocate (rows(2, system%grid%rows()))
          do j = 1, system%grid%rows()
             rows(1, j) = sum((found%left(:, 2:3, j)*system%unit_traction)**2)
@@ -376,6 +377,6 @@ contains
             .not. field_count(found%s >= 0.0_dp .and. found%s < system%width) > 0.0_dp
          if (rubbing%converged) rubbing%reason = reason_converged
       end associate
-   end subroutine hand_out
+   end subroutine return_solution
 
 end module steady_joint

@@ -2,7 +2,8 @@
 !> with the least error so far.
 !>
 !> A pressure P and a traction T determine everything else: the displacement u = A_T T, the road at x + u, the gap and the
-!> slip r. The error of the pressure is its duality gap, and that of the traction is |bound(T + c_t r) - T|/|T|.
+!> slip r. The error of the pressure is its duality gap, and that of the traction is |bound(T + c_t r) - T|/|T| (module
+!> `steady_bound`).
 module steady_judge
    use asperity_interpolation, only : interpolation_type
    use asperity_precision, only : dp
@@ -10,23 +11,25 @@ module steady_judge
    use friction_law, only : friction_law_type
    use normal_state, only : normal_problem_type, reason_converged
    use regular_grid, only : grid_type
-   use solver_result, only : solver_result_type
    use steady_bound, only : bound_tractions, compare_tractions
-   use steady_contact, only : judge_gap, read_road, steady_contact_type
+   use steady_contact, only : judge_gap, read_road, sliding_outcome_type, steady_contact_type
    use steady_operator, only : steady_operator_type
    implicit none
    private
 
    public :: new_sliding, ratio_of_lengths, sliding_type
 
-   !> How the rubber slides, and what is remembered of its contacts.
+   !> The problem of sliding, the last ratio of the traction to its unit, and the best contact.
    type :: sliding_type
       type(grid_type) :: grid
       type(friction_law_type) :: law
+      type(steady_operator_type), pointer :: operator => null()   !! K and A_T, during a solve
+      type(interpolation_type), pointer :: road => null()         !! during a solve
+      type(normal_problem_type) :: task                !! load, tolerance and units of the errors
       real(dp) :: direction(2) = 0.0_dp                !! e
       real(dp) :: base(2) = 0.0_dp                     !! displacement of the road, m
       real(dp) :: c = 0.0_dp                           !! c_t, Pa
-      real(dp), allocatable :: ratio(:, :, :)          !! T/P [nx, 2, rows]
+      real(dp), allocatable :: ratio(:, :, :)          !! T over the pressure or the strength (steady_bound) [nx, 2, rows]
       real(dp), allocatable, private :: best(:, :, :)  !! P and T of the least error, Pa [nx, 3, rows]
    contains
       procedure :: bound_and_judge
@@ -48,37 +51,30 @@ contains
       allocate (self%ratio(grid%nx, 2, grid%rows()), self%best(grid%nx, 3, grid%rows()), source=0.0_dp)
    end subroutine new_sliding
 
-   !> Return the traction of a contact to its bound, where the contact holds d(A_T T)/ds in place of the slip, and
-   !> complete the contact.
-   subroutine bound_and_judge(self, operator, task, road, contact, normal, rubbing)
+   !> Return the traction of a contact to its bound, and judge the contact.
+   subroutine bound_and_judge(self, contact, outcome)
       class(sliding_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
-      type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(steady_contact_type), intent(inout) :: contact      !! in: the slip holds d(A_T T)/ds
+      type(sliding_outcome_type), intent(inout) :: outcome
 
-      call read_road(contact, road, self%base, self%direction)
+      call read_road(contact, self%road, self%base, self%direction)
       call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
          self%ratio, contact%slip, contact%traction)
-      call self%judge(operator, task, road, contact, normal, rubbing)
+      call self%judge(contact, outcome)
    end subroutine bound_and_judge
 
-   !> Complete a contact from its P and T: displacement, road, gap, and the errors of it all.
-   subroutine judge(self, operator, task, road, contact, normal, rubbing)
+   !> Compute the displacement, road, gap and slip of a contact from its P and T, and its errors.
+   subroutine judge(self, contact, outcome)
       class(sliding_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
       real(dp), allocatable :: again(:, :, :), rows(:, :)
       integer :: j
 
-      call operator%shear(contact%traction, contact%displacement, contact%slip)
-      call read_road(contact, road, self%base, self%direction)
-      call judge_gap(contact, operator, task, normal)
+      call self%operator%shear(contact%traction, contact%displacement, contact%slip)
+      call read_road(contact, self%road, self%base, self%direction)
+      call judge_gap(contact, self%operator, self%task, outcome%normal)
       call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       allocate (again, mold=contact%traction)
       call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, &
@@ -88,9 +84,9 @@ contains
          rows(1, j) = sum((again(:, :, j) - contact%traction(:, :, j))**2)
          rows(2, j) = sum(contact%traction(:, :, j)**2)
       end do
-      rubbing%residual = ratio_of_lengths(rows)
-      rubbing%converged = rubbing%residual <= task%tolerance
-      if (rubbing%converged) rubbing%reason = reason_converged
+      outcome%rubbing%residual = ratio_of_lengths(rows)
+      outcome%rubbing%converged = outcome%rubbing%residual <= self%task%tolerance
+      if (outcome%rubbing%converged) outcome%rubbing%reason = reason_converged
    end subroutine judge
 
    !> Keep a contact if it is the best so far.
@@ -108,19 +104,16 @@ contains
 
    !> Return to the kept contact if it is better than the present one, because rounds that do not settle may
    !> oscillate.
-   subroutine return_to_best(self, operator, task, road, least, contact, normal, rubbing)
+   subroutine return_to_best(self, least, contact, outcome)
       class(sliding_type), intent(inout) :: self
-      type(steady_operator_type), intent(inout) :: operator
-      type(normal_problem_type), intent(in) :: task
-      type(interpolation_type), intent(inout) :: road
       real(dp), intent(in) :: least                    !! error of the kept contact
       type(steady_contact_type), intent(inout) :: contact
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(sliding_outcome_type), intent(inout) :: outcome
 
-      if (.not. least < max(normal%residual, rubbing%residual)) return
+      if (.not. least < outcome%residual()) return
       contact%pressure(:, :) = self%best(:, 1, :)
       contact%traction(:, :, :) = self%best(:, 2:3, :)
-      call self%judge(operator, task, road, contact, normal, rubbing)
+      call self%judge(contact, outcome)
    end subroutine return_to_best
 
    !> The length of one field over that of another, from the squares of both in each row.

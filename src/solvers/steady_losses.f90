@@ -5,7 +5,7 @@
 !>     w(q) omega Im G*/|G*|^2,    w = A_zz |P^|^2 + conj(T^).A_T T^ for a unit shear modulus,
 !>
 !> and an arm's part of it is g omega tau/(1 + (omega tau)^2) over Im G*(omega). No further solve is
-!> needed. An octave holds the wavelengths 2 pi/|q| in (L/2^k, L/2^(k-1)], L the longest of the cell.
+!> needed. Octave k holds the wavelengths 2 pi/|q| in (L/2^k, L/2^(k-1)], where L is the longest side of the cell.
 module steady_losses
    use asperity_precision, only : dp, pi
    use field_sums, only : row_totals
@@ -20,13 +20,13 @@ module steady_losses
    type :: steady_losses_type
       real(dp) :: normal = 0.0_dp                      !! by the pressure
       real(dp) :: tangential = 0.0_dp                  !! by the traction
-      real(dp), allocatable :: octave(:)               !! of both, from the longest waves on
-      real(dp), allocatable :: arm(:)                  !! of both
+      real(dp), allocatable :: octave(:)               !! of both, by octaves, the longest waves first
+      real(dp), allocatable :: arm(:)                  !! of both, by arms
    end type steady_losses_type
 
 contains
 
-   !> Octaves from the longest wave of a cell to the shortest of its grid.
+   !> Number of octaves from the longest wave of a cell to the shortest of its grid.
    pure function count_octaves(grid) result(octaves)
       type(grid_type), intent(in) :: grid
       integer :: octaves
@@ -65,7 +65,7 @@ contains
       if (i == 0 .or. 2*i == grid%nx) weight = 1.0_dp
    end function mode_weight
 
-   !> w of a mode for the normal and for the tangential side, m/Pa times Pa^2: means over the cell.
+   !> w of a mode for the normal and for the tangential direction: means over the cell, m Pa.
    pure function elastic_forms(medium, i, j, p, t) result(forms)
       type(medium_type), intent(in) :: medium
       integer, intent(in) :: i, j
@@ -85,7 +85,7 @@ contains
       forms = forms*mode_weight(medium%grid, i)/medium%grid%cells()**2
    end function elastic_forms
 
-   !> The losses of a state from the transforms of its pressure and traction. Processes share the wave
+   !> Compute the losses of a state from the transforms of its pressure and traction. Processes share the wave
    !> numbers along y like the rows of the grid.
    subroutine sum_losses(medium, p, t, losses)
       type(medium_type), intent(in) :: medium
@@ -113,7 +113,7 @@ contains
       allocate (losses%arm(arms), source=total(3 + octaves:))
    end subroutine sum_losses
 
-   !> The losses of the modes of one row: normal, tangential, octaves, arms.
+   !> Compute the losses of the modes of one row: normal, tangential, octaves, arms.
    subroutine row_losses(medium, j, octaves, p, sums, t)
       type(medium_type), intent(in) :: medium
       integer, intent(in) :: j, octaves

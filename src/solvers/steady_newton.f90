@@ -25,8 +25,8 @@ module steady_newton
 
    integer, parameter :: most_rounds = 20
    integer, parameter :: most_directions = 60    !! of GMRES; a useful guess needs fewer
-   integer, parameter :: patience = 3            !! rounds that need not come closer
-   integer, parameter :: first_trial = 32        !! iteration of the splitting from which a trial may pay
+   integer, parameter :: patience = 3            !! an attempt ends after more rounds that do not come closer
+   integer, parameter :: first_trial = 32        !! iteration of the splitting from which an attempt may save time
    real(dp), parameter :: price = 24.0_dp        !! of an attempt, in iterations of the splitting
    real(dp), parameter :: near = 1.0e-3_dp       !! error of the splitting from which C usually settles
    real(dp), parameter :: accuracy = 0.1_dp      !! of a solution while C changes

@@ -1,29 +1,29 @@
 !> Normal contact in steady sliding: P >= 0, gap = K P - H - level >= 0, P gap = 0, mean P given.
 !>
-!> K is the complex symbol of `steady_symbols`: as an operator it is not symmetric, so there is no
-!> energy to minimise and conjugate gradients do not apply. It is monotone (a rubber loses energy), and
-!> the Douglas-Rachford splitting of Lions and Mercier (1979) then converges from any start and for any
-!> c > 0:
+!> K is the operator whose complex symbol module `steady_symbols` computes. It is not symmetric. There is therefore no
+!> energy to minimise, and conjugate gradients do not apply. It is monotone, because a rubber loses energy. The
+!> Douglas-Rachford splitting of Lions and Mercier (1979) then converges from any start and for any c > 0:
 !>
-!>     P = nearest field to z with P >= 0 and the load given       (module projection)
+!>     P = nearest field to z with P >= 0 and the prescribed mean    (module projection)
 !>     y = (1 + c K)^-1 (2 P - z + c H)                              diagonal in Fourier space
 !>     z <- z + (y - P)
 !>
-!> At the fixed point z is P where there is contact, and -c gap elsewhere; that sets the scale c.
-!> Anderson acceleration makes it five to ten times faster. Near the solution, Newton's method on the cells in contact
-!> may be faster still (modules `steady_active` and `steady_newton`). From a distant start it fails on materials
-!> whose modulus spans three decades.
+!> At the fixed point z is P in contact and -c gap elsewhere, up to a constant. Module `steady_scale` therefore chooses c
+!> so that both parts of z have about the same size. Anderson acceleration makes it five to ten times faster. Near the
+!> solution, Newton's method on the cells in contact may be faster still (modules `steady_active` and `steady_newton`).
+!> From a distant start it fails on materials whose modulus spans three decades.
 !>
-!> Converged means the same as for module `normal_cg`: the duality gap e1 of a fresh U = K P, over the
-!> rms height or a smaller scale where the contact is small, and the error of the load.
+!> The criterion of convergence is that of module `normal_cg`: the duality gap e1 of a fresh U = K P, divided by the rms
+!> height or by a smaller scale if the contact is small, and the error of the load.
 !>
-!> Memory: z, its residual, P; seven fields for the acceleration, and what `steady_operator` takes.
+!> Memory: four fields of doubles (z, its residual, P and the best P), eight for the acceleration, and what
+!> `steady_operator` takes.
 module steady_normal
    use anderson, only : anderson_type, new_anderson
    use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type, &
       prepare_problem, reason_converged, reason_iterations
    use asperity_precision, only : dp, int64
-   use field_sums, only : cell_count, field_count, field_mean, field_minimum, field_sum, least_of_rows, row_totals
+   use field_sums, only : field_count, field_mean, field_minimum, field_sum, least_of_rows, row_totals
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -31,6 +31,7 @@ module steady_normal
    use steady_active, only : finish_on_contact, worthwhile
    use steady_newton, only : finish_by_newton, promising
    use steady_operator, only : steady_operator_type
+   use steady_scale, only : bounded_scale, fitting_scale, misfit
    implicit none
    private
 
@@ -39,13 +40,13 @@ module steady_normal
    integer, parameter :: pairs = 6               !! of the acceleration
    integer, parameter :: sums_count = 7
    integer, parameter :: first_trial = 16        !! iteration at which finishing on few cells is first tried
-   real(dp), parameter :: cautious = 2.0_dp      !! growth of the residual that stops accelerating
+   real(dp), parameter :: cautious = 2.0_dp      !! factor of growth of the residual after which a step is plain
 
-   !> What one evaluation of the fixed-point map measures.
+   !> The measures of one evaluation of the fixed-point map.
    type, public :: steady_measure_type
       real(dp) :: error = huge(1.0_dp)           !! duality gap over the scale of the problem
       real(dp) :: change = 0.0_dp                !! |y - P|, root of the sum of squares, Pa
-      real(dp) :: size = 0.0_dp                  !! |P| alike, Pa
+      real(dp) :: size = 0.0_dp                  !! |P|, likewise, Pa
       real(dp) :: scale = 0.0_dp                 !! c that would fit this state, Pa/m; 0: not known
    end type steady_measure_type
 
@@ -63,10 +64,10 @@ module steady_normal
    type :: steady_normal_type
       type(grid_type) :: grid
       real(dp) :: c = 0.0_dp                            !! Pa/m
-      real(dp), allocatable :: z(:, :)                  !! state of the splitting, Pa
+      real(dp), allocatable :: z(:, :)                  !! state of the iteration, Pa
       real(dp), allocatable :: pressure(:, :)           !! P of z, Pa
       real(dp), allocatable :: residual(:, :)           !! y - P, Pa
-      real(dp), allocatable, private :: best(:, :)      !! P of the least error, Pa
+      real(dp), allocatable, private :: best(:, :)      !! P with the least error so far, Pa
       type(anderson_type), private :: memory
    contains
       procedure :: solve
@@ -91,7 +92,8 @@ contains
       call new_anderson(self%memory, grid%nx, 1, rows, pairs)
    end subroutine new_steady_normal
 
-   !> Solve under a road. Not converging is an outcome: the best state is handed out.
+   !> Solve the contact with a road. If the iteration does not converge, the outcome says so, and the result is the
+   !> pressure with the least error.
    subroutine solve(self, operator, problem, height, pressure, gap, level, outcome)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator    !! with its symbols set
@@ -109,7 +111,7 @@ contains
 
       progress%ffts_before = operator%ffts
       call prepare_problem(problem, self%grid, operator%threads, height, task, determined)
-      task%datum = 0.0_dp          ! here gaps are U - H, with H as it is
+      task%datum = 0.0_dp          ! gaps are U - H here; heights are not measured from another level
       mean = field_mean(height)
       call self%start(operator, task, height, pressure, gap)
       outcome%reason = reason_iterations
@@ -207,11 +209,11 @@ contains
       type(normal_problem_type), intent(in) :: task
       real(dp), intent(in) :: height(:, :)
       real(dp), intent(inout) :: pressure(:, :), gap(:, :)
-      type(steady_measure_type) :: measure
-      real(dp) :: level
+      real(dp) :: level, scale
 
       call self%memory%forget()
-      if (.not. task%warm .or. closes_up(self, operator, task, height, pressure)) then
+      if (.not. task%warm .or. is_full_contact(self, operator, task, height, pressure)) then
+         ! The pressure of full contact, made admissible, is a good start for any load.
          call operator%press(height, pressure)
          pressure = pressure + task%target
          call project_simplex(pressure, task%target*self%grid%cells())
@@ -221,24 +223,25 @@ contains
       level = field_sum(merge(gap, 0.0_dp, pressure > 0.0_dp)) &
          /max(field_count(pressure > 0.0_dp), 1.0_dp)
       self%c = 1.0_dp/operator%longest
-      call scale_of(pressure, gap - level, measure)
-      if (measure%scale > 0.0_dp) self%c = bounded(operator, measure%scale)
+      scale = fitting_scale(pressure, gap - level)
+      if (scale > 0.0_dp) self%c = bounded_scale(operator, scale)
       call operator%set_scale(self%c)
       where (pressure > 0.0_dp)
          self%z = pressure
       else where
          self%z = -self%c*max(gap - level, 0.0_dp)
       end where
-      ! The mean of z is that of P at the solution. The load is adjusted here, where open cells know their gap
-      ! and stay open.
+      ! At the solution z has the mean of P. The start gets this mean by a shift of z and not of P, because open cells
+      ! then keep their gaps and stay open.
       self%z = self%z + (task%target - field_mean(self%z))
       pressure(:, :) = self%z
       call project_simplex(pressure, task%target*self%grid%cells())
    end subroutine start
 
    !> Is the solution full contact? A given start, such as the state that is extrapolated from those of other loads and
-   !> speeds, may be far from it. This is asked only if most cells of the start touch, since it takes two transforms.
-   function closes_up(self, operator, task, height, pressure) result(yes)
+   !> speeds, may be far from it. The test is made only if most cells of the start touch, because it takes two
+   !> transforms.
+   function is_full_contact(self, operator, task, height, pressure) result(yes)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
@@ -250,42 +253,9 @@ contains
       if (.not. yes) return
       call operator%press(height, self%z)
       yes = field_minimum(self%z) + task%target >= 0.0_dp
-   end function closes_up
+   end function is_full_contact
 
-   !> The scale that fits a state: it makes a typical pressure twice as large as c times a typical gap.
-   subroutine scale_of(pressure, gap, measure)
-      real(dp), intent(in) :: pressure(:, :)
-      real(dp), intent(in) :: gap(:, :)                !! zero in contact, m
-      type(steady_measure_type), intent(inout) :: measure
-      real(dp) :: open_gap, touching
-
-      touching = field_count(pressure > 0.0_dp)
-      open_gap = field_sum(merge(max(gap, 0.0_dp), 0.0_dp, pressure <= 0.0_dp)) &
-         /max(cell_count(pressure) - touching, 1.0_dp)
-      measure%scale = 0.0_dp
-      if (open_gap > 0.0_dp .and. touching > 0.0_dp) &
-         measure%scale = 2.0_dp*(field_sum(max(pressure, 0.0_dp))/touching)/open_gap
-   end subroutine scale_of
-
-   !> Limit c to the range of the compliances.
-   pure function bounded(operator, c) result(limited)
-      type(steady_operator_type), intent(in) :: operator
-      real(dp), intent(in) :: c
-      real(dp) :: limited
-
-      limited = min(max(c, 0.02_dp/operator%longest), 50.0_dp/operator%shortest)
-   end function bounded
-
-   !> The factor by which two scales differ; 1 if one of them is not known.
-   pure function misfit(a, b) result(factor)
-      real(dp), intent(in) :: a, b
-      real(dp) :: factor
-
-      factor = 1.0_dp
-      if (a > 0.0_dp .and. b > 0.0_dp) factor = max(a/b, b/a)
-   end function misfit
-
-   !> One evaluation of the map at z: P, the residual y - P, and how far it is from a solution.
+   !> Evaluate the map at z: compute P and the residual y - P, and measure how far they are from a solution.
    subroutine evaluate(self, operator, task, height, mean, z, measure)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
@@ -319,16 +289,16 @@ contains
       open_cells = self%grid%cells() - sums(5)
       if (sums(5) > 0.0_dp .and. open_cells > 0.0_dp) then
          opened = (sums(7) - sums(6)/sums(5)*open_cells)/open_cells
-         if (opened > 0.0_dp) measure%scale = bounded(operator, 2.0_dp*sums(1)/sums(5)/opened)
+         if (opened > 0.0_dp) measure%scale = bounded_scale(operator, 2.0_dp*sums(1)/sums(5)/opened)
       end if
    end subroutine evaluate
 
-   !> Sums of a row: P, P g, (y-P)^2, P^2, cells in contact, g there, g elsewhere; and the least g.
-   !> The gap is that of y, g = K y - H = (2 P - z - y)/c. On return y holds y - P.
+   !> Form the sums of a row: P, P g, (y - P)^2, P^2, the number of cells in contact, g there, g elsewhere; and the
+   !> least g. The gap is that of y: g = K y - H = (2 P - z - y)/c.
    pure subroutine measure_row(c, pressure, z, y, sums)
       real(dp), intent(in) :: c
       real(dp), intent(in) :: pressure(:), z(:)
-      real(dp), intent(inout) :: y(:)
+      real(dp), intent(inout) :: y(:)                  !! in: y; out: y - P, Pa
       real(dp), intent(out) :: sums(:)
       real(dp) :: gap, work, change, squares, cells, inside, outside, least, load
       integer :: i
@@ -371,7 +341,7 @@ contains
       if (changed) call self%take_scale(operator, task, scale)
    end subroutine rescale
 
-   !> Change c, and adjust the state z.
+   !> Change c, and adjust the state z: its negative part is -c gap.
    subroutine take_scale(self, operator, task, scale)
       class(steady_normal_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator

@@ -3,7 +3,7 @@
 !>
 !> Far from the solution the acceleration would diverge, so that the first rounds are plain. It begins when the
 !> change of a round is small, and ends when the change grows again; it then restarts only closer to the solution.
-!> Plain rounds that do not halve their change in `slow` rounds are relaxed more strongly and solve the
+!> Plain rounds that do not halve their change in `check_every` rounds are relaxed more strongly and solve the
 !> normal contact more accurately.
 !>
 !> Rounds converge slowly where some cells nearly stick: the direction of their traction follows the slip only by a
@@ -19,7 +19,7 @@ module steady_pace
 
    integer, parameter, public :: components = 5  !! of a state: z, u, r
 
-   integer, parameter :: slow = 12               !! plain rounds between two checks of their progress
+   integer, parameter :: check_every = 12        !! plain rounds between two checks of their progress
 
    ! Attempts to solve all cells at once:
    integer, parameter, public :: no_attempt = 0
@@ -27,14 +27,16 @@ module steady_pace
    integer, parameter, public :: from_best = 2   !! from the best contact so far
    integer, parameter, public :: along_path = 3  !! from the contact without friction, along a path of solutions
    integer, parameter, public :: along_second_path = 4
-   integer, parameter :: first_far = 150         !! rounds before the first attempt from afar; half as many before each of the next
-   integer, parameter :: first_with_jump = 100   !! the same where the traction jumps at the edge
+   !> Rounds before the first attempt that does not start from the present contact. The next two follow after half as
+   !> many rounds each.
+   integer, parameter :: first_far = 150
+   integer, parameter :: first_with_jump = 100   !! the same if the traction jumps at the edge of the contact
    integer, parameter :: compared = 8            !! rounds whose least change is compared with that of as many before
-   integer, parameter :: patience = 25           !! rounds after an attempt from here without another one
-   real(dp), parameter :: within_reach = 1.0e-3_dp   !! change from which an attempt from here usually succeeds
-   real(dp), parameter :: almost = 5.0_dp        !! error, in tolerances, below which the rounds continue in any case
+   integer, parameter :: patience = 25           !! least number of rounds between attempts from the present contact
+   real(dp), parameter :: near_solution = 1.0e-3_dp  !! change below which an attempt from here usually succeeds
+   real(dp), parameter :: almost = 5.0_dp        !! change, in tolerances, below which the rounds continue in any case
    real(dp), parameter :: price = 1200.0_dp      !! transforms of such an attempt on a grid of ...
-   real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; it grows like the side of the grid
+   real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; their number grows like its square root
 
    !> The pace of the rounds.
    type :: pace_type
@@ -42,15 +44,15 @@ module steady_pace
       integer :: inner = 4                       !! normal steps in a round
       logical :: accelerated = .false.
       real(dp) :: near = 0.03_dp                 !! change below which rounds are accelerated
-      real(dp) :: least = huge(1.0_dp)           !! change so far, while accelerated
-      real(dp) :: marked = huge(1.0_dp)          !! change some rounds ago
-      integer :: since = 0                       !! rounds since then
+      real(dp) :: least = huge(1.0_dp)           !! least change since the acceleration began
+      real(dp) :: marked = huge(1.0_dp)          !! change at the last check of the progress of plain rounds
+      integer :: since = 0                       !! plain rounds since that check
       real(dp) :: weights(components) = 0.0_dp   !! of the components in the acceleration
       integer :: attempt = no_attempt            !! to solve all cells at once, after this round
-      integer, private :: next_attempt = 2*compared     !! the round of the next one from here
+      integer, private :: next_attempt = 2*compared     !! first round in which one from here is allowed
       real(dp), private :: recent(2*compared) = huge(1.0_dp)   !! changes of the last rounds
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
-      real(dp) :: best = huge(1.0_dp)            !! largest error of the kept contact
+      real(dp) :: best = huge(1.0_dp)            !! error of the best contact so far
    contains
       procedure :: choose
       procedure :: choose_attempt
@@ -96,11 +98,11 @@ contains
       if (rounds == 2*first) self%attempt = along_second_path
       if (self%attempt /= no_attempt .or. rounds < self%next_attempt) return
 
-      ! An accelerated round may be far off. The progress is that of the least changes, and an attempt starts from one of
-      ! them.
+      ! An accelerated round may have a much larger change than its neighbours. The progress is therefore measured by the
+      ! least changes, and an attempt starts only from a round whose change is near the least one.
       least = minval(self%recent(compared + 1:))
       least_before = minval(self%recent(:compared))
-      if (least > within_reach .or. least < almost*tolerance .or. change > 2.0_dp*least) return
+      if (least > near_solution .or. least < almost*tolerance .or. change > 2.0_dp*least) return
       decades_per_round = log10(least_before/least)/compared
       decades_left = log10(least/tolerance)
       transforms = 6.0_dp + 2.0_dp*self%inner
@@ -109,13 +111,13 @@ contains
       self%next_attempt = rounds + max(patience, rounds/2)
    end subroutine choose_attempt
 
-   !> Note a plain step, and slow down if such steps make no progress.
+   !> Count a plain step, and relax the next ones more strongly if plain steps make no progress.
    subroutine note_plain(self, change)
       class(pace_type), intent(inout) :: self
       real(dp), intent(in) :: change             !! of the last round
 
       self%since = self%since + 1
-      if (self%since < slow) return
+      if (self%since < check_every) return
       if (change > 0.5_dp*self%marked) then
          self%beta = max(0.15_dp, 0.6_dp*self%beta)
          self%inner = min(12, self%inner + 3)

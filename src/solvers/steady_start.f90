@@ -35,7 +35,7 @@ contains
       contact%offset = 0.0_dp
    end subroutine contact_without_friction
 
-   !> T over P, or over the strength, of a cell that slides straight ahead.
+   !> The ratio of T to P, or to the strength, of a cell that slides along the motion of the road.
    subroutine ratio_of_sliding(law, direction, ratio)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: direction(2)             !! e
@@ -47,12 +47,12 @@ contains
       end do
    end subroutine ratio_of_sliding
 
-   !> The tractions of a contact whose cells slide straight ahead.
+   !> Compute the tractions of a contact whose cells all slide along the motion of the road.
    subroutine full_sliding(law, c, direction, ratio, contact)
       type(friction_law_type), intent(in) :: law
       real(dp), intent(in) :: c                        !! c_t, Pa
       real(dp), intent(in) :: direction(2)             !! e
-      real(dp), intent(inout) :: ratio(:, :, :)        !! work space
+      real(dp), intent(inout) :: ratio(:, :, :)        !! out: as in `ratio_of_sliding`
       type(steady_contact_type), intent(inout) :: contact
       integer :: k
 
