@@ -66,6 +66,32 @@ def test_view_of_a_run_that_is_going(tmp_path, monkeypatch):
     assert all(line.isascii() for line in plain if "%" in line or "area  " in line)
 
 
+
+@pytest.mark.parametrize("width", [45, 60, 100])
+def test_the_bars_of_all_columns_show_the_same_rows(tmp_path, monkeypatch, width):
+    monkeypatch.chdir(tmp_path)
+    path = frictional_result(Path("bars.h5"), finished=0)
+    rows = 200
+    with h5py.File(path, "a") as file:
+        for column in file["history"].values():
+            column.resize((rows,))
+        file["history/friction"][:] = np.linspace(0.0, 1.0, rows)
+        file["history/contact_area"][:] = np.linspace(0.1234, 0.5678, rows)
+        file["history/stick_area"][:] = np.linspace(0.0, 0.01234, rows)
+    pace = Pace()
+    pace.look(0.0, rows)
+    lines = picture(asperity.open(path), pace, width)
+    assert max(map(len, lines)) <= width
+    bars = [line for line in lines if set(line) & set("▁▂▃▄▅▆▇█")]
+    # One line for each column, in which the bars begin and end at the same places.
+    assert [line[:12].strip() for line in bars] == ["friction", "contact area", "stick area"]
+    places = {tuple(i for i, character in enumerate(line) if character in "▁▂▃▄▅▆▇█")
+              for line in bars}
+    assert len(places) == 1
+    assert len(places.pop()) >= 12
+    assert [" to " in line for line in bars] == 3 * [width > 50]
+
+
 def test_plain_lines_where_there_is_no_terminal(tmp_path, monkeypatch):
     path = frictional_result(tmp_path / "going.h5", finished=0)
     looks = []

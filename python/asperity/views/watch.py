@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["sparkline", "watch"]
 
 BARS = "▁▂▃▄▅▆▇█"
+LEAST_BARS = 12  # number of bars of a narrow terminal, which shows no smallest and largest value
 
 
 def sparkline(values: ArrayLike, width: int = 40, bars: str = BARS) -> str:
@@ -168,13 +169,17 @@ def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]
         names.insert(0, ("friction", "friction"))
     if "stick_area" in history and np.any(history["stick_area"]):
         names.append(("stick_area", "stick area"))
-    for name, label in names:
-        if name in history and history.rows:
-            values = history[name]
-            ends = f" {values[-1]:<9.4g} ({values.min():.3g} to {values.max():.3g})"
-            room = max(width - 14 - len(ends), 8)
-            lines.append(f"{label:>12}  "
-                         f"{sparkline(values, room, BARS if unicode else '_.-=oO#@')}{ends}")
+    columns = [(label, history[name]) for name, label in names if name in history and history.rows]
+    ends = [(f" {values[-1]:<9.4g}", f" ({values.min():.3g} to {values.max():.3g})")
+            for _, values in columns]
+    # All bars have one width, so that they show the same rows above each other.
+    room = width - 14 - max((len(last + most) for last, most in ends), default=0)
+    if room < LEAST_BARS:
+        ends = [(last, "") for last, _ in ends]
+        room = max(width - 14 - max((len(last) for last, _ in ends), default=0), LEAST_BARS)
+    for (label, values), (last, most) in zip(columns, ends, strict=True):
+        bars = sparkline(values, room, BARS if unicode else "_.-=oO#@")
+        lines.append(f"{label:>12}  {bars}{last}{most}")
     lines.append(last_row(run))
     for line in run.warnings:
         lines.append(f"warning: {line}")
