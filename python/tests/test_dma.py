@@ -587,3 +587,38 @@ def test_a_fit_that_fails_is_status_4(tmp_path, monkeypatch, capsys):
     assert not (tmp_path / "x.nml").exists()
     with pytest.raises(NotConverged, match="Maximum number of iterations"):
         fit_dma(read_dma(path))
+
+
+@pytest.mark.parametrize("heads, units", [
+    ("f (Hz),Set temperature (°C),T actual (°C),G' (MPa),G'' (MPa)", None),
+    ("f,T soll,T ist,G',G''", "Hz,°C,°C,MPa,MPa"),
+    ("f (Hz),Temp. set,Temp. probe,G' (MPa),G'' (MPa)", None),
+])
+def test_of_two_temperatures_one_must_be_named(tmp_path, heads, units):
+    frequencies = np.geomspace(0.1, 10.0, 5)
+    rows = [(f, round(t), t, a, b) for f, a, b, t in sweeps((0.1, 20.1, 39.9), frequencies)]
+    path = write(tmp_path / "two.csv", heads + (f"\n{units}" if units else ""), rows)
+    first, second = [head.split(" (")[0] for head in heads.split(",")[1:3]]
+    with pytest.raises(ValueError, match=rf"'{first}.*' and '{second}.*' may both be the"
+                                         r" temperature: say which"):
+        read_dma(path)
+    table = read_dma(path, columns={"temperature": heads.split(",")[2]})
+    np.testing.assert_allclose(np.unique(table.temperature), (0.1, 20.1, 39.9))
+    # A single column that can only be the temperature is taken.
+    one = write(tmp_path / "one.csv", ",".join(heads.split(",")[:1] + heads.split(",")[2:])
+                + (f"\n{units.replace(',°C', '', 1)}" if units else ""),
+                [(f, t, a, b) for f, _, t, a, b in rows])
+    np.testing.assert_allclose(np.unique(read_dma(one).temperature), (0.1, 20.1, 39.9))
+
+
+def test_moduli_that_differ_at_one_frequency_are_reported(tmp_path):
+    rows = [(f, a, b, t) for f, a, b, t in sweeps((0.0, 40.0), np.geomspace(0.1, 10.0, 5))]
+    path = write(tmp_path / "hidden.csv", "f (Hz),G' (MPa),G'' (MPa),oven", rows)
+    (note,) = [note for note in read_dma(path).notes if "same frequency" in note]
+    assert "no column is known as the temperature" in note
+    assert not read_dma(path, columns={"temperature": "oven"}).notes[1:]
+    # Repeated measurements scatter by less.
+    path = write(tmp_path / "again.csv", "f (Hz),G' (MPa),G'' (MPa)",
+                 [row[:3] for k in range(3) for row in sweeps((20.0,), np.geomspace(0.1, 10.0, 5),
+                                                              0.03 * k)])
+    assert read_dma(path).notes == []

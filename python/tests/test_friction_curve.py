@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import stat
 import subprocess
@@ -404,6 +405,14 @@ def test_picture(curve, tmp_path):
     assert (tmp_path / "curve.png").stat().st_size > 20000
 
 
+def test_the_settings_on_the_page_have_units(curve, tmp_path):
+    text = curve.to_html(tmp_path / "curve.html").read_text(encoding="utf-8")
+    found = dict(re.findall(r"<tr><th>([\w ]+)</th><td>(.*?)</td></tr>", text))
+    assert found["lx"] == f"{curve.settings['lx']} m"
+    assert found["shortest wave"].endswith(" m") and found["angle"].endswith("°")
+    assert found["extended to"].endswith(" m") == (curve.settings["extended_to"] != "no")
+
+
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
 def test_page_in_a_browser(curve, tmp_path):
     page = curve.to_html(tmp_path / "curve.html")
@@ -492,9 +501,16 @@ def test_from_an_instrument_and_a_messy_table_to_numbers(tmp_path, monkeypatch, 
     assert main([*words, "--plan"]) == 0
     printed = capsys.readouterr().out
     assert "solves     16 steady states in 8 runs" in printed
-    assert "the maps have room for 4 patches that do not overlap, not for 9" in printed
+    assert "the maps have room for 4 patches without overlap, not for 9" in printed
     assert "1 of 16384 cells lie far off their neighbours" in printed
     assert "1 of 39 points have no value" in printed
+    kept = re.search(r"waves +(\S+) to \S+ m are kept of (\S+) to", printed)
+    assert float(kept[1]) <= float(kept[2])
+    assert main([*words, "--plan", "--temperatures", "20", "--speeds", "1e-3"]) == 0
+    assert "1 speed x 1 pressure x 1 temperature\n" in capsys.readouterr().out
+    # Where the columns of the table have to be named, the same option as in `fit` names them.
+    assert main([*words, "--plan", "--column", "temperature=oven"]) == 2
+    assert "temperature = 'oven'" in capsys.readouterr().err
     assert not (tmp_path / "curve_runs").exists()
     assert main(words) == 0
     printed = capsys.readouterr().out

@@ -541,4 +541,4 @@ def test_the_command_s_errors(tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit):
         main(["import", "--level", "flat", "map.npy"])
     assert main(["import", "map.npy", "--list"]) == 0
-    assert "23 x 14 points" in capsys.readouterr().out
+    assert "23 x 14 points, no unit" in capsys.readouterr().out

@@ -123,6 +123,10 @@ def test_info_describes_a_height_map(program, tmp_path):
                           boundary="free")
     done = subprocess.run([program, "info", "map.h5"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "map.h5", "a") as file:
+        file.attrs["steps_text"] = "levelled (mean)\nlengths and heights from um to m"
+    assert "processing  levelled (mean); lengths and heights from um to m\n" in subprocess.run(
+        [program, "info", "map.h5"], cwd=tmp_path, capture_output=True, text=True).stdout
     for message in ("a height map", "diagonal", "6 x 8 cells", "m, free", "heights     0 m to",
                  "file = 'map.h5'"):
         assert message in done.stdout, done.stdout

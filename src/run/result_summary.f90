@@ -105,7 +105,8 @@ contains
       text = text//'to use it   &surface shape = ''file'', file = '''//path//''' /'//nl
    end subroutine describe_map
 
-   !> The line for an attribute of the file; '' if there is no such attribute, or if it is empty.
+   !> The line for an attribute of the file, whose own lines are separated by semicolons; '' if there is no such
+   !> attribute, or if it is empty.
    function attribute_line(file, name, head, most) result(line)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: name
@@ -113,10 +114,16 @@ contains
       integer, intent(in) :: most                    !! longest text of the attribute
       character(:), allocatable :: line
       character(:), allocatable :: words
+      integer :: at
 
       line = ''
       if (.not. file%has_attribute('/', name)) return
       call file%read_attribute('/', name, words)
+      do
+         at = index(words, nl)
+         if (at == 0) exit
+         words = words(:at - 1)//'; '//words(at + 1:)
+      end do
       if (words /= '') line = head//ordinary(words, most)//nl
    end function attribute_line
 

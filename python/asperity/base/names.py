@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-__all__ = ["NamedFields", "NamedValues", "OpenValues", "UnknownNameError", "unknown_name"]
+__all__ = ["NamedFields", "NamedValues", "OpenValues", "UnknownNameError", "counted",
+           "unknown_name"]
 
 
 class UnknownNameError(KeyError):
@@ -35,6 +36,17 @@ def unknown_name(what: str, name: object, names: Iterable[str]) -> str:
     else:
         hint = f"there are {', '.join(known)}" if known else "there is none"
     return f"no {what} is named {name!r}: {hint}"
+
+
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Return a number with its noun, whose plural takes an s if it is not given.
+
+    Examples
+    --------
+    >>> counted(1, "row"), counted(0, "row"), counted(2, "patch", "patches")
+    ('1 row', '0 rows', '2 patches')
+    """
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 class NamedValues(Mapping[str, Any]):

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-__all__ = ["add_fit", "add_import"]
+__all__ = ["add_columns", "add_fit", "add_import", "columns_of"]
 
 
 def add_import(verbs: Any) -> None:
@@ -90,9 +90,7 @@ def add_fit(verbs: Any) -> None:
     parser.add_argument("--least-plateau", type=float, default=0.01, metavar="SHARE",
                         help="smallest plateau modulus as a share of the lowest storage modulus"
                              " (default: 0.01)")
-    parser.add_argument("--column", action="append", default=[], metavar="ROLE=NAME|N",
-                        help="name or number (from 1) of the column of a role: frequency, storage,"
-                             " loss, temperature or tan_delta; may be repeated")
+    add_columns(parser, "the table")
     parser.add_argument("--frequency-unit", metavar="UNIT", help="Hz, kHz, mHz, rad/s or krad/s")
     parser.add_argument("--modulus-unit", metavar="UNIT", help="Pa, kPa, MPa or GPa")
     parser.add_argument("--temperature-unit", metavar="UNIT", help="C or K")
@@ -116,6 +114,24 @@ def add_fit(verbs: Any) -> None:
     parser.set_defaults(call=_fit)
 
 
+def add_columns(parser: argparse.ArgumentParser, table: str) -> None:
+    """Add the option that names the columns of a DMA table."""
+    parser.add_argument("--column", action="append", default=[], metavar="ROLE=NAME|N",
+                        help=f"name or number (from 1) of the column of {table} for a role:"
+                             " frequency, storage, loss, temperature or tan_delta; may be repeated")
+
+
+def columns_of(chosen: argparse.Namespace) -> dict[str, str]:
+    """Return the names or numbers of the columns by their roles."""
+    columns = {}
+    for given in chosen.column:
+        role, equals, name = given.partition("=")
+        if not equals or not name.strip():
+            raise ValueError(f"--column {given}: must be ROLE=NAME or ROLE=NUMBER")
+        columns[role.strip()] = name.strip()
+    return columns
+
+
 def _other_groups(path: Path) -> str:
     """Return the groups of an input other than `&material`, or '' if there are none."""
     if not path.is_file():
@@ -130,12 +146,6 @@ def _fit(chosen: argparse.Namespace) -> int:
     from ..rubber.dma import fit_dma, read_dma
     from ..views.style import check_picture, save_picture
 
-    columns = {}
-    for given in chosen.column:
-        role, equals, name = given.partition("=")
-        if not equals or not name.strip():
-            raise ValueError(f"--column {given}: must be ROLE=NAME or ROLE=NUMBER")
-        columns[role.strip()] = name.strip()
     check_picture(chosen.plot)
     output = chosen.output
     if output is not None:
@@ -152,7 +162,7 @@ def _fit(chosen: argparse.Namespace) -> int:
         raise OSError(f"{chosen.plot}: cannot be written: there is no folder"
                       f" {str(chosen.plot.parent)!r}")
     table = read_dma(
-        chosen.table, columns=columns, frequency_unit=chosen.frequency_unit,
+        chosen.table, columns=columns_of(chosen), frequency_unit=chosen.frequency_unit,
         modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,
         kind=chosen.kind, poisson=chosen.poisson)
     fit = fit_dma(

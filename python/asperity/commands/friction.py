@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .data import add_columns, columns_of
+
 if TYPE_CHECKING:
     from ..results.friction_curve import FrictionCurve
 
@@ -112,6 +114,7 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
 
 def _add_rubber(parser: argparse.ArgumentParser) -> None:
     """Add the options for the fit of a DMA table."""
+    add_columns(parser, "a DMA table")
     parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
                         help="constants of the shift of a DMA table, see `fit`")
     parser.add_argument("--reference", type=float, metavar="T",
@@ -158,7 +161,7 @@ def _friction(chosen: argparse.Namespace) -> int:
                    short=chosen.short, outliers=chosen.outliers, draw=chosen.draw,
                    seed=chosen.seed, **options)
     compound = compound_of(chosen.material, wlf=chosen.wlf, reference=chosen.reference,
-                           vertical=chosen.vertical)
+                           vertical=chosen.vertical, columns=columns_of(chosen))
     plan = plan_curve(road, compound, speeds=chosen.speeds, pressures=chosen.pressures,
                       temperatures=chosen.temperatures, patches=chosen.patches,
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import array_of, number, positive, whole
+from ..base.names import counted
 from ..roads.patches import DrawnRoad, MeasuredRoad, Patch
 from ..rubber.compound import Compound
 from ..runs.case import Case
@@ -176,18 +177,20 @@ class CurvePlan:
         """
         road, patch = self.road, self.road.patch(0)
         ny, nx = patch.height.shape
-        kept = f"{_longest(self):.4g} to {road.short:.4g} m"
+        band = road.whole_spectrum.band
+        kept = f"{min(_longest(self), band[0]):.4g} to {road.short:.4g} m"
         lines = [
-            f"road       {road.name}: {self.patches} patches of {nx} x {ny} cells,"
-            f" {patch.lx:.4g} x {patch.ly:.4g} m"
+            f"road       {road.name}: {counted(self.patches, 'patch', 'patches')} of"
+            f" {nx} x {ny} cells, {patch.lx:.4g} x {patch.ly:.4g} m"
             + ("" if road.join == "none" else f", made periodic by {road.join!r}"),
-            f"waves      {kept} are kept of {road.whole_spectrum.band[0]:.4g} to"
-            f" {min(road.whole_spectrum.band[1], road.short):.4g} m",
-            f"rubber     {self.compound.name}: {self.compound.series.g.size} arms",
-            f"points     {self.speed.size} speeds x {self.pressure.size} pressures x"
-            f" {self.temperature.size} temperatures",
-            f"solves     {self.solves} steady states in"
-            f" {self.solves // self.speed.size} runs, {side_by_side} at a time",
+            f"waves      {kept} are kept of {band[0]:.4g} to"
+            f" {min(band[1], road.short):.4g} m",
+            f"rubber     {self.compound.name}: {counted(self.compound.series.g.size, 'arm')}",
+            f"points     {counted(self.speed.size, 'speed')} x"
+            f" {counted(self.pressure.size, 'pressure')} x"
+            f" {counted(self.temperature.size, 'temperature')}",
+            f"solves     {counted(self.solves, 'steady state')} in"
+            f" {counted(self.solves // self.speed.size, 'run')}, {side_by_side} at a time",
             f"time       about {_duration(_COMMAND + self.seconds() / side_by_side)}, if the"
             " processors have nothing else to do",
             f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
@@ -259,8 +262,8 @@ def plan_curve(
             raise ValueError(f"{name}: {values[:-1][np.diff(values) == 0.0][0]:g} is given twice")
     wanted, notes = whole("patches", patches), []
     if road.count is not None and wanted > road.count:
-        notes.append(f"the maps have room for {road.count} patches that do not overlap, not for"
-                     f" {wanted}")
+        notes.append(f"the maps have room for {counted(road.count, 'patch', 'patches')} without"
+                     f" overlap, not for {wanted}")
         wanted = road.count
     if angle is None:
         angle = 0.0 if road.is_measured else 31.7
@@ -294,10 +297,11 @@ def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
     for some, where, end in ((below, "below", low), (above, "above", high)):
         if some.size:
             at = "" if math.isnan(celsius) else f"at {celsius:g} °C, "
-            notes.append(f"{at}{some.size} of {plan.speed.size} speeds ({some[0]:.3g}"
-                         f" to {some[-1]:.3g} m/s) load the rubber in part {where} the measured"
-                         f" frequencies: the limit is {end:.3g} m/s, beyond it the series is a"
-                         " guess")
+            which = f"{some[0]:.3g}" + (f" to {some[-1]:.3g}" if some.size > 1 else "")
+            notes.append(f"{at}{some.size} of {counted(plan.speed.size, 'speed')} ({which} m/s)"
+                         f" {'loads' if some.size == 1 else 'load'} the rubber in part {where} the"
+                         f" measured frequencies: the limit is {end:.3g} m/s, beyond it the series"
+                         " is a guess")
     return notes
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +164,7 @@ def compound_of(
     reference: float | None = None,
     vertical: bool = False,
     arms_per_decade: float = 1.0,
+    columns: Mapping[str, str | int] | None = None,
 ) -> Compound:
     """Return the rubber of a namelist with ``&material``, of a DMA table, or of a Prony series.
 
@@ -174,6 +175,8 @@ def compound_of(
         a table for `asperity.dma.read_dma`.
     wlf, reference, vertical, arms_per_decade
         As in `asperity.dma.fit_dma`, for tables.
+    columns : mapping, optional
+        Columns of a table by role, as in `asperity.dma.read_dma`.
 
     Returns
     -------
@@ -195,7 +198,7 @@ def compound_of(
     words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")
     if words.startswith(("&", "$")):
         return _of_namelist(path)
-    fit = fit_dma(read_dma(path), wlf=wlf, reference=reference, vertical=vertical,
+    fit = fit_dma(read_dma(path, columns=columns), wlf=wlf, reference=reference, vertical=vertical,
                   arms_per_decade=arms_per_decade)
     return Compound(fit.material, fit.reference, fit.wlf, dict(fit.shifts),
                     dict(fit.vertical_shifts), fit.valid_range, fit.name, list(fit.notes))

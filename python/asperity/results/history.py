@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.names import NamedValues
+from ..base.names import NamedValues, counted
 from ..base.optional import needed
 from ..base.presenters import present
 from .column_types import HistoryColumns
@@ -139,7 +139,7 @@ class History(NamedValues, HistoryColumns):
         return present("history_html", self)
 
     def __repr__(self) -> str:
-        lines = [f"history of {self.rows} row{'' if self.rows == 1 else 's'}"]
+        lines = [f"history of {counted(self.rows, 'row')}"]
         for name, column in self._values.items():
             last = f"{column[-1]:.6g}" if self.rows else "-"
             units = self._units.get(name, "1")

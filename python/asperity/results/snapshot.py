@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import h5py
 from numpy.typing import NDArray
 
-from ..base.names import NamedFields, UnknownNameError, unknown_name
+from ..base.names import NamedFields, UnknownNameError, counted, unknown_name
 from ..base.presenters import present
 from .field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 from .reading import read_file, scalar_of, text_of
@@ -259,4 +259,4 @@ class Snapshots(Sequence[Snapshot]):
         known = self.steps
         shown = known if len(known) <= 12 else (*known[:5], "...", *known[-3:])
         steps = ", ".join(map(str, shown)) or "none"
-        return f"{len(self)} snapshot{'' if len(self) == 1 else 's'} (steps {steps})"
+        return f"{counted(len(self), 'snapshot')} (steps {steps})"

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.names import counted
+
 if TYPE_CHECKING:
     from .result_file import ResultFile
 
@@ -65,7 +67,7 @@ def rows_of(run: ResultFile) -> str:
     rows, expected = run.history.rows, int(run.attributes.get("expected_rows", 0) or 0)
     if expected and not run.finished:
         return f"{rows} of {expected} rows"
-    return f"{rows} row{'' if rows == 1 else 's'}"
+    return counted(rows, "row")
 
 
 def silence(run: ResultFile) -> float | None:

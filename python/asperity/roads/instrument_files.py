@@ -137,7 +137,8 @@ def _channel_line(channel: Any) -> str:
     points = " x ".join(map(str, channel.nb_grid_pts or ())) or "?"
     kind = "map" if channel.dim == 2 else "line scan"
     data = "heights" if channel.is_height_channel else str(channel.data_kind.name).lower()
-    return f"{channel.channel_id!r}: {kind} of {data}, {points} points, unit {channel.unit}"
+    unit = f"unit {channel.unit}" if channel.unit else "no unit"
+    return f"{channel.channel_id!r}: {kind} of {data}, {points} points, {unit}"
 
 
 def _choose(reader: Any, path: Path, wanted: str | int | None) -> Any:

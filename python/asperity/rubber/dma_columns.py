@@ -177,7 +177,7 @@ def find_columns(
     """Return the index and the unit of each column by role, and 'tension' for tensile moduli."""
     heads = header[1]
     parts = [_name_and_unit(head) for head in heads]
-    places = _places(path, header, parts, given)
+    places = _places(path, header, parts, units, given)
     found: dict[str, str | None] = {}
     for role, at in places.items():
         unit = parts[at][1] if at < len(parts) else None
@@ -200,14 +200,28 @@ def find_columns(
     return places, found, kind
 
 
+def _like_temperatures(parts: list[tuple[str, str | None]], units: list[str]) -> list[int]:
+    """Return the columns whose name and unit can mean a temperature, such as "T set (°C)"."""
+    found = []
+    for i, (name, unit) in enumerate(parts):
+        if unit is None and i < len(units):
+            unit = _unit(units[i]) or units[i].strip() or None
+        if (unit in TEMPERATURE_UNITS and name.startswith("t")) or (
+                "temp" in name and unit in (None, *TEMPERATURE_UNITS)):
+            found.append(i)
+    return found
+
+
 def _places(path: Path, header: tuple[int, list[str]], parts: list[tuple[str, str | None]],
-            given: Mapping[str, str | int]) -> dict[str, int]:
+            units: list[str], given: Mapping[str, str | int]) -> dict[str, int]:
     """Return the index of each column by role: first the requested columns, then known names."""
     line, heads = header
     places = _asked(path, heads, parts, given)
     for role, names in _NAMES.items():
         match = [i for i, (name, _) in enumerate(parts)
                  if name in names and i not in places.values()]
+        if role == "temperature" and not match:
+            match = _like_temperatures(parts, units)
         if role in places or not match:
             continue
         if len(match) > 1:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import number, positive
+from ..base.names import counted
 from ..base.presenters import present
 from .dma_table import DmaTable
 from .master_curve import MasterCurve, master_curve
@@ -408,7 +409,7 @@ def _enough(table: DmaTable, sweeps: list[Rows]) -> None:
     for t, rows in sweeps:
         if np.unique(table.omega[rows]).size < 3:
             count = int(np.unique(table.omega[rows]).size)
-            raise ValueError(f"{table.name}: {count} frequenc{'y' if count == 1 else 'ies'} at"
+            raise ValueError(f"{table.name}: {counted(count, 'frequency', 'frequencies')} at"
                              f" {t:g} C: shifting needs at least 3, or WLF constants (wlf,"
                              " --wlf C1 C2)")
 

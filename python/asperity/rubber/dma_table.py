@@ -28,6 +28,7 @@ __all__ = ["DmaTable", "read_dma"]
 FloatArray = NDArray[np.float64]
 
 _MOST_FAULTS = 10
+_LARGEST_SPREAD = 1.5   # of storage moduli that are measured at one frequency and temperature
 
 
 @dataclass(frozen=True)
@@ -162,10 +163,20 @@ def read_dma(
         factor = 0.5 / (1.0 + poisson)
         storage, loss = factor * storage, factor * loss
         notes.append(f"moduli in tension: G = E/(2 (1 + poisson)) = {factor:.6g} E")
-    temperature = None
-    if "temperature" in places:
-        temperature = values["temperature"] + to_celsius
+    temperature = values["temperature"] + to_celsius if "temperature" in places else None
+    if temperature is None:
+        notes += _repeated(values["frequency"], storage)
     return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
+
+
+def _repeated(frequency: FloatArray, storage: FloatArray) -> list[str]:
+    """Return a note if the moduli at one frequency differ so much that a temperature is missing."""
+    spread = max(float(np.ptp(np.log(storage[frequency == one]))) for one in np.unique(frequency))
+    if spread < math.log(_LARGEST_SPREAD):
+        return []
+    return [f"moduli at the same frequency differ by a factor of {math.exp(spread):.3g}, and no"
+            " column is known as the temperature: if there is one, name it (columns, --column"
+            " temperature=NAME)"]
 
 
 def _measured(body: Rows, places: Mapping[str, int]) -> tuple[Rows, list[str]]:

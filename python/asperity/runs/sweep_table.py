@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.names import UnknownNameError, unknown_name
+from ..base.names import UnknownNameError, counted, unknown_name
 from ..base.optional import needed
 from ..base.presenters import present
 from ..results import Run, open_result
@@ -162,7 +162,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
             shown += self.results[:3]
         cells = [[_short(self._columns[name][row]) for name in shown]
                  for row in range(min(self.rows, _ROWS))]
-        head = f"sweep of {self.rows} case{'' if self.rows == 1 else 's'}"
+        head = f"sweep of {counted(self.rows, 'case')}"
         if self.failed:
             head += f", {len(self.failed)} failed"
         more = [f"{number} more {what}" for number, what in

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.library import version
+from ..base.names import counted
 from ..results import open_result
 from .page_parts import colour_scales, fill_page, page_file, page_json
 from .report_data import blocks, now, packed
@@ -24,6 +25,9 @@ __all__ = ["curve_page", "write_curve_page"]
 SCRIPTS = ("save.js", "theme.js", "chart.js", "map.js", "curve.js")
 _BUDGET = 12e6          # characters that all maps may take together
 _SIDES = (192, 128, 96, 64, 48, 32)
+
+# Of the settings. The curve is extended to a wavelength, or not at all.
+_UNITS = {"lx": " m", "ly": " m", "shortest_wave": " m", "extended_to": " m", "angle": "°"}
 
 _NAMES = {"friction": "friction", "friction_viscous": "viscous", "friction_interface": "interface",
           "contact_area": "contact area", "mean_gap": "mean gap",
@@ -81,11 +85,10 @@ def curve_page(curve: FrictionCurve) -> str:
 
 def _subtitle(curve: FrictionCurve) -> str:
     """Return the line under the title."""
-    counts = [f"{len(values)} {name}{'' if len(values) == 1 else 's'}" for name, values in
+    counts = [counted(len(values), name) for name, values in
               (("pressure", curve.pressure), ("temperature", curve.temperature),
                ("speed", curve.speed))]
-    patches = len(curve.patches)
-    return (f"{', '.join(counts)}; {patches} patch{'' if patches == 1 else 'es'} of"
+    return (f"{', '.join(counts)}; {counted(len(curve.patches), 'patch', 'patches')} of"
             f" {curve.settings['nx']} × {curve.settings['ny']} cells; steady sliding")
 
 
@@ -183,8 +186,9 @@ def _cell(value: float) -> str:
 def _settings(curve: FrictionCurve) -> str:
     """Return the settings of the curve and the list of its patches."""
     rows = "".join(f"<tr><th>{escape(name.replace('_', ' '))}</th>"
-                   f"<td>{escape(typeset(value))}</td></tr>"
-                   for name, value in curve.settings_text().items())
+                   f"<td>{escape(typeset(value))}"
+                   f"{'' if value == 'no' else _UNITS.get(name, '')}</td></tr>"
+                   for name, value in curve.settings_text().items() )
     patches = "".join(f"<li>{escape(typeset(label))}</li>" for label in curve.patches)
     left = np.asarray(curve.theory["friction_left_out"])
     more = ""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.names import counted
 from ..results.standing import note_of, rows_of
 from .style import si_scale, typeset
 
@@ -76,7 +77,7 @@ def history_html(history: History) -> str:
         rows.append((f"<code>{escape(name)}</code>", *numbers, curve(column),
                      escape(history.long_name(name))))
     return table_html(("column", "last", "smallest", "largest", "", "meaning"), rows,
-                      f"<b>History</b> of {history.rows} row{'' if history.rows == 1 else 's'}")
+                      f"<b>History</b> of {counted(history.rows, 'row')}")
 
 
 def snapshot_html(snapshot: Snapshot) -> str:

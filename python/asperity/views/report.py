@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.library import version
+from ..base.names import counted
 from ..results.derived import closure, energy_terms, has_friction, missing_work, solver_setting
 from ..results.standing import (
     duration,
@@ -214,8 +215,8 @@ def _mean_friction(run: Run) -> str:
         return f'\n<p class="soft">Mean friction {mean}: {escape(found.note)}.</p>'
     error = "" if np.isnan(found.error) else f" ± {found.error:.2g}"
     note = f"; {escape(found.note)}" if found.note else ""
-    return (f'\n<p class="soft">Mean friction over the last {found.laps:.0f}'
-            f" lap{'' if found.laps == 1 else 's'} of the road: {mean}{error}{note}.</p>")
+    return (f'\n<p class="soft">Mean friction over the last'
+            f" {counted(round(found.laps), 'lap')} of the road: {mean}{error}{note}.</p>")
 
 
 def _sections(run: Run, data: dict[str, Any]) -> list[tuple[str, str, str]]:
