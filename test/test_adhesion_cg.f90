@@ -1,6 +1,7 @@
 !> Tests of adhesive contact in periodic mode.
 module test_adhesion_cg
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
+   use adhesion_fixture, only : contact_type, new_contact
    use adhesion_model, only : adhesion_model_type, new_adhesion_model
    use adhesion_patch, only : adhesion_patch_type, new_adhesion_patch
    use adhesion_potential, only : adhesion_potential_type, adhesive_energy, adhesive_slope, &
@@ -16,7 +17,6 @@ module test_adhesion_cg
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
-   use solver_result, only : solver_result_type
    use transform_shape, only : whole_shape
    implicit none
    private
@@ -91,6 +91,32 @@ contains
       end do
    end function waves
 
+   !> A contact with such a surface at first touch.
+   subroutine new_waves(contact, nx, ny, lx, ly, amplitude, method)
+      type(contact_type), intent(out) :: contact
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: lx, ly, amplitude
+      character(*), intent(in), optional :: method
+      type(grid_type) :: grid
+
+      grid = new_grid(nx, ny, lx, ly, boundary_periodic)
+      call new_contact(contact, grid, poisson, modulus, waves(grid, amplitude), method)
+   end subroutine new_waves
+
+   !> A line contact with one wave at first touch.
+   subroutine new_line(contact, n, ly, amplitude)
+      type(contact_type), intent(out) :: contact
+      integer, intent(in) :: n                     !! cells
+      real(dp), intent(in) :: ly, amplitude
+      real(dp) :: height(n, 1)
+      integer :: i
+
+      do i = 1, n
+         height(i, 1) = amplitude*cos(2.0_dp*pi*(i - 0.5_dp)/n)
+      end do
+      call new_contact(contact, new_grid(n, 1, 1.0_dp, ly, boundary_periodic), poisson, modulus, height)
+   end subroutine new_line
+
    !> A fixed uneven field of values between -1 and 1.
    function noise(nx, ny) result(field)
       integer, intent(in) :: nx, ny
@@ -153,45 +179,36 @@ contains
    !> differences.
    subroutine pressure_is_gradient_of_energy(name)
       character(*), intent(in) :: name
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), start(:, :), pressure(:, :), past(:, :)
-      real(dp) :: level, h, slope
+      type(contact_type) :: c
+      real(dp), allocatable :: start(:, :), past(:, :)
+      real(dp) :: h, slope
       integer :: k, i, j
 
-      grid = new_grid(9, 7, 1.0_dp, 0.6_dp, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      call check_no_error(error, 'solver')
-      height = waves(grid, 0.01_dp)
+      call new_waves(c, 9, 7, 1.0_dp, 0.6_dp, 0.01_dp)
       start = 0.02_dp*(1.2_dp + noise(9, 7))
       past = 0.05_dp*noise(9, 7)
       past = past - sum(past)/size(past)
-      gap = start
-      pressure = 0.0_dp*gap
-      problem%potential = potential_of(name, 5e-4_dp, 0.02_dp)
-      problem%modulus = modulus
-      problem%target = 0.03_dp
-      problem%max_iterations = 0
-      call solver%solve(problem, height, gap, pressure, level, outcome, past)
-      call check_that(outcome%iterations == 0 .and. .not. outcome%converged, 'no iteration')
-      call check_that(all(gap == start), 'no iteration leaves the gap')
+      c%gap = start
+      c%problem%potential = potential_of(name, 5e-4_dp, 0.02_dp)
+      c%problem%target = 0.03_dp
+      c%problem%max_iterations = 0
+      call c%solve(past)
+      call check_that(c%outcome%iterations == 0 .and. .not. c%outcome%converged, 'no iteration')
+      call check_that(all(c%gap == start), 'no iteration leaves the gap')
       h = 1e-6_dp
       do k = 1, 8
          i = 1 + modulo(5*k, 9)
          j = 1 + modulo(3*k, 7)
-         start(i, j) = gap(i, j) + h
-         slope = energy_sum(grid, problem, height, start, past, 0.03_dp)
-         start(i, j) = gap(i, j) - h
-         slope = (slope - energy_sum(grid, problem, height, start, past, 0.03_dp))/(2*h)
-         start(i, j) = gap(i, j)
+         start(i, j) = c%gap(i, j) + h
+         slope = energy_sum(c%grid, c%problem, c%height, start, past, 0.03_dp)
+         start(i, j) = c%gap(i, j) - h
+         slope = (slope - energy_sum(c%grid, c%problem, c%height, start, past, 0.03_dp))/(2*h)
+         start(i, j) = c%gap(i, j)
          ! Pressures are of order 0.1; h^2/6 e''' = 1e-9 of gamma/z_0, round-off 1e-16/1e-6.
-         call check_close(pressure(i, j) + adhesive_slope(problem%potential, gap(i, j)), slope, &
+         call check_close(c%pressure(i, j) + adhesive_slope(c%problem%potential, c%gap(i, j)), slope, &
             2e-9_dp, name//': gradient by differences')
       end do
-      call solver%destroy()
+      call c%destroy()
    end subroutine pressure_is_gradient_of_energy
 
    !> The conditions of a solution hold when they are recomputed, for both controls, both starts, and with a
@@ -200,58 +217,47 @@ contains
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
       character(*), intent(in) :: name
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), past(:, :), other(:, :), &
-         traction(:, :), shifted(:, :)
+      type(contact_type) :: c
+      real(dp), allocatable :: past(:, :), other(:, :), traction(:, :), shifted(:, :)
       type(convolution_type) :: operator
+      type(error_type), allocatable :: error
       real(dp), allocatable :: symbol(:, :)
-      real(dp) :: level, scale, again, range
+      real(dp) :: scale, again, range
       integer :: i, j
 
       range = 0.02_dp
-      grid = new_grid(nx, ny, lx, ly, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      call check_no_error(error, 'solver')
-      height = waves(grid, 0.01_dp)
-      past = 0.05_dp*waves(grid, 1.0_dp)
-      problem%potential = potential_of(name, 3e-4_dp, range)
-      problem%modulus = modulus
-      problem%target = 0.05_dp
-      problem%tolerance = 1e-8_dp
-      gap = maxval(height) - height
-      pressure = 0.0_dp*gap
-      call solver%solve(problem, height, gap, pressure, level, outcome, past)
-      call check_that(outcome%converged, name//': '//trim(outcome%reason))
+      call new_waves(c, nx, ny, lx, ly, 0.01_dp)
+      past = 0.05_dp*waves(c%grid, 1.0_dp)
+      c%problem%potential = potential_of(name, 3e-4_dp, range)
+      c%problem%target = 0.05_dp
+      c%problem%tolerance = 1e-8_dp
+      call c%converge(name, past)
       scale = 3e-4_dp/range
-      traction = modulus*stiffness_sum(grid, height + gap) - past
+      traction = modulus*stiffness_sum(c%grid, c%height + c%gap) - past
       traction = traction - sum(traction)/size(traction) + 0.05_dp
-      call check_close(maxval(abs(traction - pressure)), 0.0_dp, 1e-11_dp, name//': pressure')
-      call check_that(minval(gap) >= 0.0_dp .and. any(gap == 0.0_dp) .and. any(gap > 0.0_dp), &
+      call check_close(maxval(abs(traction - c%pressure)), 0.0_dp, 1e-11_dp, name//': pressure')
+      call check_that(minval(c%gap) >= 0.0_dp .and. any(c%gap == 0.0_dp) .and. any(c%gap > 0.0_dp), &
          name//': a partial contact')
-      traction = traction + adhesive_slope(problem%potential, gap)
-      call check_close(maxval(abs(min(gap/range, traction/scale))), 0.0_dp, 1.01e-8_dp, &
+      traction = traction + adhesive_slope(c%problem%potential, c%gap)
+      call check_close(maxval(abs(min(c%gap/range, traction/scale))), 0.0_dp, 1.01e-8_dp, &
          name//': natural residual')
-      call check_close(outcome%residual, maxval(abs(min(gap/range, traction/scale))), 1e-10_dp, &
+      call check_close(c%outcome%residual, maxval(abs(min(c%gap/range, traction/scale))), 1e-10_dp, &
          name//': the residual that is returned')
-      call check_that(minval(pressure, mask=gap == 0.0_dp) >= &
-         -adhesive_slope(problem%potential, 0.0_dp) - 1e-8_dp*scale, name//': release rule')
-      call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-14_dp, name//': load')
-      call check_close(sum(gap + height)/size(gap) + level, 0.0_dp, 1e-14_dp, name//': level')
+      call check_that(minval(c%pressure, mask=c%gap == 0.0_dp) >= &
+         -adhesive_slope(c%problem%potential, 0.0_dp) - 1e-8_dp*scale, name//': release rule')
+      call check_close(sum(c%pressure)/size(c%pressure), 0.05_dp, 1e-14_dp, name//': load')
+      call check_close(sum(c%gap + c%height)/size(c%gap) + c%level, 0.0_dp, 1e-14_dp, name//': level')
 
       ! If the level of that state is prescribed, the solver returns the state and its pressure.
-      problem%control = control_approach
-      problem%target = level
-      other = gap
+      c%problem%control = control_approach
+      c%problem%target = c%level
+      other = c%gap
       again = 0.0_dp
-      call solver%solve(problem, height, other, pressure, again, outcome, past)
-      call check_that(outcome%converged, name//': level prescribed: '//trim(outcome%reason))
-      call check_close(sum(pressure)/size(pressure), 0.05_dp, 1e-7_dp, name//': multiplier')
-      call check_close(again, level, 1e-14_dp, name//': level kept')
-      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-6_dp*range, name//': same gap')
+      call c%solver%solve(c%problem, c%height, other, c%pressure, again, c%outcome, past)
+      call check_that(c%outcome%converged, name//': level prescribed: '//trim(c%outcome%reason))
+      call check_close(sum(c%pressure)/size(c%pressure), 0.05_dp, 1e-7_dp, name//': multiplier')
+      call check_close(again, c%level, 1e-14_dp, name//': level kept')
+      call check_close(maxval(abs(other - c%gap)), 0.0_dp, 1e-6_dp*range, name//': same gap')
 
       ! A history is equivalent to a change of the height, H' = H - A P_h/Q.
       allocate (symbol(0:nx/2, 0:ny/2), source=0.0_dp)
@@ -262,61 +268,50 @@ contains
       end do
       call new_symbol_operator(operator, whole_shape(nx, ny, 1), error)
       call operator%set_symbol(symbol)
-      shifted = height
+      shifted = c%height
       call operator%apply(past, shifted)
-      shifted = height - shifted/modulus
-      problem%control = control_pressure
-      problem%target = 0.05_dp
-      other = gap
-      call solver%solve(problem, shifted, other, pressure, again, outcome)
-      call check_that(outcome%converged, name//': no history: '//trim(outcome%reason))
-      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-6_dp*range, name//': history as height')
+      shifted = c%height - shifted/modulus
+      c%problem%control = control_pressure
+      c%problem%target = 0.05_dp
+      other = c%gap
+      call c%solver%solve(c%problem, shifted, other, c%pressure, again, c%outcome)
+      call check_that(c%outcome%converged, name//': no history: '//trim(c%outcome%reason))
+      call check_close(maxval(abs(other - c%gap)), 0.0_dp, 1e-6_dp*range, name//': history as height')
       call operator%destroy()
-      call solver%destroy()
+      call c%destroy()
    end subroutine solution_meets_its_conditions
 
    !> The thesis's method finds the same solution if the minimum is unique, at prescribed load and level.
    subroutine thesis_method_agrees(name)
       character(*), intent(in) :: name
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: fast, thesis
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), past(:, :), other(:, :)
-      real(dp) :: level, again
+      type(contact_type) :: fast, thesis
+      real(dp), allocatable :: past(:, :)
 
-      grid = new_grid(35, 28, 1.0_dp, 0.9_dp, boundary_periodic)
-      call new_adhesion_solver(fast, grid, normal_half_space(poisson), error)
-      call new_adhesion_solver(thesis, grid, normal_half_space(poisson), error, method='thesis')
-      call check_no_error(error, 'thesis')
-      height = waves(grid, 0.02_dp)
+      call new_waves(fast, 35, 28, 1.0_dp, 0.9_dp, 0.02_dp)
+      call new_waves(thesis, 35, 28, 1.0_dp, 0.9_dp, 0.02_dp, 'thesis')
       past = 0.02_dp*noise(35, 28)
-      problem%potential = potential_of(name, 2e-4_dp, 0.02_dp)
-      problem%modulus = modulus
-      problem%target = 0.02_dp
-      problem%tolerance = 1e-7_dp
-      gap = maxval(height) - height
-      other = gap
-      pressure = 0.0_dp*gap
-      call fast%solve(problem, height, gap, pressure, level, outcome, past)
-      call check_that(outcome%converged, name//': fast: '//trim(outcome%reason))
+      fast%problem%potential = potential_of(name, 2e-4_dp, 0.02_dp)
+      fast%problem%target = 0.02_dp
+      fast%problem%tolerance = 1e-7_dp
+      thesis%problem = fast%problem
+      call fast%converge(name//': fast', past)
       ! Cells beside the kink of Maugis-Dugdale cause many minima, close together. Therefore start near this
       ! one.
-      if (name == 'maugis_dugdale') other = max(gap - 1e-3_dp*0.02_dp, 0.0_dp)
-      call thesis%solve(problem, height, other, pressure, again, outcome, past)
-      call check_that(outcome%converged, name//': thesis: '//trim(outcome%reason))
-      call check_that(outcome%iterations > 10 .and. outcome%ffts >= 4*outcome%iterations, 'its cost', &
-         [real(outcome%iterations, dp), real(outcome%ffts, dp)])
-      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': fast and thesis')
-      call check_close(again, level, 1e-5_dp*0.02_dp, name//': fast and thesis: level')
-      problem%control = control_approach
-      problem%target = level + 0.01_dp
-      call fast%solve(problem, height, gap, pressure, level, outcome, past)
-      call check_that(outcome%converged, name//': fast, level: '//trim(outcome%reason))
-      call thesis%solve(problem, height, other, pressure, again, outcome, past)
-      call check_that(outcome%converged, name//': thesis, level: '//trim(outcome%reason))
-      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': the same, level')
+      if (name == 'maugis_dugdale') thesis%gap = max(fast%gap - 1e-3_dp*0.02_dp, 0.0_dp)
+      call thesis%converge(name//': thesis', past)
+      associate (outcome => thesis%outcome)
+         call check_that(outcome%iterations > 10 .and. outcome%ffts >= 4*outcome%iterations, 'its cost', &
+            [real(outcome%iterations, dp), real(outcome%ffts, dp)])
+      end associate
+      call check_close(maxval(abs(thesis%gap - fast%gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': fast and thesis')
+      call check_close(thesis%level, fast%level, 1e-5_dp*0.02_dp, name//': fast and thesis: level')
+
+      fast%problem%control = control_approach
+      fast%problem%target = fast%level + 0.01_dp
+      thesis%problem = fast%problem
+      call fast%converge(name//': fast, level', past)
+      call thesis%converge(name//': thesis, level', past)
+      call check_close(maxval(abs(thesis%gap - fast%gap)), 0.0_dp, 1e-4_dp*0.02_dp, name//': the same, level')
       call fast%destroy()
       call thesis%destroy()
    end subroutine thesis_method_agrees
@@ -324,109 +319,78 @@ contains
    !> The energy after k iterations decreases with k.
    subroutine energy_falls_with_the_iterations(name, method)
       character(*), intent(in) :: name, method
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), none(:, :)
-      real(dp) :: level, energy, before
+      type(contact_type) :: c
+      real(dp), allocatable :: none(:, :)
+      real(dp) :: energy, before
       integer :: k
 
-      grid = new_grid(20, 14, 1.0_dp, 0.9_dp, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, method=method)
-      height = waves(grid, 0.02_dp)
-      none = 0.0_dp*height
-      problem%potential = potential_of(name, 2e-3_dp, 0.004_dp)
-      problem%modulus = modulus
-      problem%target = 0.02_dp
+      call new_waves(c, 20, 14, 1.0_dp, 0.9_dp, 0.02_dp, method)
+      none = 0.0_dp*c%height
+      c%problem%potential = potential_of(name, 2e-3_dp, 0.004_dp)
+      c%problem%target = 0.02_dp
       before = huge(1.0_dp)
       do k = 0, 24
-         problem%max_iterations = k
-         gap = maxval(height) - height
-         pressure = none
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         energy = energy_sum(grid, problem, height, gap, none, 0.02_dp)
+         c%problem%max_iterations = k
+         call c%touch()
+         call c%solve()
+         energy = energy_sum(c%grid, c%problem, c%height, c%gap, none, 0.02_dp)
          ! Round-off of energies of 0.5.
          call check_order(energy, '<=', before + 1e-13_dp, &
             name//' '//method//': the energy never rises')
          before = energy
-         if (outcome%converged) exit
+         if (c%outcome%converged) exit
       end do
-      call solver%destroy()
+      call c%destroy()
    end subroutine energy_falls_with_the_iterations
 
    !> dE/d(level) = N p along the states of prescribed level.
    subroutine force_is_derivative_of_energy()
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), none(:, :)
-      real(dp) :: level, energy(-1:1), load, h
+      type(contact_type) :: c
+      real(dp), allocatable :: none(:, :)
+      real(dp) :: energy(-1:1), load, h
       integer :: k, step
 
-      grid = new_grid(24, 15, 1.0_dp, 0.6_dp, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = waves(grid, 0.01_dp)
-      none = 0.0_dp*height
-      problem%potential = potential_of('exponential', 5e-4_dp, 0.03_dp)
-      problem%modulus = modulus
-      problem%control = control_approach
-      problem%tolerance = 1e-10_dp
+      call new_waves(c, 24, 15, 1.0_dp, 0.6_dp, 0.01_dp)
+      none = 0.0_dp*c%height
+      c%problem%potential = potential_of('exponential', 5e-4_dp, 0.03_dp)
+      c%problem%control = control_approach
+      c%problem%tolerance = 1e-10_dp
       h = 1e-5_dp
-      gap = maxval(height) - height
-      pressure = none
       do k = 1, 3
          do step = -1, 1
-            problem%target = -maxval(height) + 0.008_dp*(k - 2) + step*h
-            call solver%solve(problem, height, gap, pressure, level, outcome)
-            call check_that(outcome%converged, 'level: '//trim(outcome%reason))
-            energy(step) = energy_sum(grid, problem, height, gap, none, 0.0_dp)
-            if (step == 0) load = sum(pressure)
+            c%problem%target = -maxval(c%height) + 0.008_dp*(k - 2) + step*h
+            call c%converge('level')
+            energy(step) = energy_sum(c%grid, c%problem, c%height, c%gap, none, 0.0_dp)
+            if (step == 0) load = sum(c%pressure)
          end do
          ! The curvature of the energy changes where cells come into contact; the error is h times the change.
          call check_close((energy(1) - energy(-1))/(2*h), load, 1e-4_dp, 'force from the energy')
       end do
-      call solver%destroy()
+      call c%destroy()
    end subroutine force_is_derivative_of_energy
 
    !> Without adhesion: Westergaard's wave, mean pressure p* sin^2(pi a/L), a line contact.
    subroutine westergaard_wave_without_adhesion()
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), other(:, :)
-      real(dp) :: level, peak
+      type(contact_type) :: c
+      real(dp), allocatable :: other(:, :)
+      real(dp) :: peak
       integer :: i
       integer, parameter :: n = 400
 
-      grid = new_grid(n, 1, 1.0_dp, 1.0_dp, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      allocate (height(n, 1))
-      do i = 1, n
-         height(i, 1) = 0.01_dp*cos(2.0_dp*pi*(i - 0.5_dp)/n)
-      end do
+      call new_line(c, n, 1.0_dp, 0.01_dp)
       peak = pi*0.01_dp
-      problem%modulus = modulus
-      problem%target = peak*sin(pi*0.2_dp)**2
-      problem%tolerance = 1e-9_dp
-      gap = maxval(height) - height
-      pressure = 0.0_dp*gap
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(outcome%converged, 'no adhesion: '//trim(outcome%reason))
-      call check_order(abs(count(gap == 0.0_dp)/real(n, dp) - 0.4_dp), '<=', 1.01_dp/n*2, 'width')
+      c%problem%target = peak*sin(pi*0.2_dp)**2
+      c%problem%tolerance = 1e-9_dp
+      call c%converge('no adhesion')
+      call check_order(abs(count(c%gap == 0.0_dp)/real(n, dp) - 0.4_dp), '<=', 1.01_dp/n*2, 'width')
       ! p(0) = 2 p_mean/sin(psi_a); the error is of second order in the cell, apart from the edge.
-      call check_close(maxval(pressure), 2*problem%target/sin(pi*0.2_dp), 1e-3_dp*peak, 'peak')
-      problem%potential = potential_of('exponential', 0.0_dp, 1e-3_dp)
-      other = maxval(height) - height
-      call solver%solve(problem, height, other, pressure, level, outcome)
-      call check_that(outcome%converged, 'no energy: '//trim(outcome%reason))
-      call check_close(maxval(abs(other - gap)), 0.0_dp, 1e-8_dp, 'no energy is no adhesion')
-      call solver%destroy()
+      call check_close(maxval(c%pressure), 2*c%problem%target/sin(pi*0.2_dp), 1e-3_dp*peak, 'peak')
+      c%problem%potential = potential_of('exponential', 0.0_dp, 1e-3_dp)
+      other = maxval(c%height) - c%height
+      call c%solver%solve(c%problem, c%height, other, c%pressure, c%level, c%outcome)
+      call check_that(c%outcome%converged, 'no energy: '//trim(c%outcome%reason))
+      call check_close(maxval(abs(other - c%gap)), 0.0_dp, 1e-8_dp, 'no energy is no adhesion')
+      call c%destroy()
    end subroutine westergaard_wave_without_adhesion
 
    !> Johnson's (1995) adhesive wave, a line contact of short range: at the half-width a
@@ -447,64 +411,40 @@ contains
          integer, intent(in) :: n
          real(dp), intent(in) :: range
          real(dp), intent(out) :: error_of_load
-         type(grid_type) :: grid
-         type(adhesion_solver_type) :: solver
-         type(adhesion_problem_type) :: problem
-         type(solver_result_type) :: outcome
-         type(error_type), allocatable :: error
-         real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-         real(dp) :: level, psi, peak
+         type(contact_type) :: c
+         real(dp) :: psi, peak
          integer :: i
          real(dp), parameter :: amplitude = 0.1_dp, gamma = 2e-3_dp
 
-         grid = new_grid(n, 1, 1.0_dp, 1.0_dp/n, boundary_periodic)
-         call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-         allocate (height(n, 1))
-         do i = 1, n
-            height(i, 1) = amplitude*cos(2.0_dp*pi*(i - 0.5_dp)/n)
-         end do
-         problem%modulus = modulus
-         problem%control = control_approach
-         problem%target = -0.05_dp
-         problem%potential = potential_of('exponential', gamma, range)
-         gap = maxval(height) - height
-         pressure = 0.0_dp*gap
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged, 'Johnson''s wave: '//trim(outcome%reason))
-         psi = pi*0.5_dp*count(gap == 0.0_dp)/n
+         call new_line(c, n, 1.0_dp/n, amplitude)
+         c%problem%control = control_approach
+         c%problem%target = -0.05_dp
+         c%problem%potential = potential_of('exponential', gamma, range)
+         call c%converge('Johnson''s wave')
+         psi = pi*0.5_dp*count(c%gap == 0.0_dp)/n
          peak = pi*amplitude
-         error_of_load = (sum(pressure)/n - (peak*sin(psi)**2 - sqrt(2*gamma*tan(psi))))/peak
-         call solver%destroy()
+         error_of_load = (sum(c%pressure)/n - (peak*sin(psi)**2 - sqrt(2*gamma*tan(psi))))/peak
+         call c%destroy()
       end subroutine wave
 
    end subroutine johnson_adhesive_wave
 
    !> Strong attraction of short range on a rough surface: the solver converges.
    subroutine strong_attraction_on_rough_surface()
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      real(dp) :: level
+      type(contact_type) :: c
       integer :: l
 
-      grid = new_grid(80, 66, 1.0_dp, 0.9_dp, boundary_periodic)
-      height = waves(grid, 0.02_dp) + 0.002_dp*noise(80, 66)
       do l = 1, size(potentials)
-         call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-         problem%modulus = modulus
-         problem%target = 0.01_dp
-         problem%potential = potential_of(trim(potentials(l)), 2e-3_dp, 1e-3_dp)
-         gap = maxval(height) - height
-         pressure = 0.0_dp*gap
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged .and. outcome%residual <= 1e-6_dp, &
-            'strong '//trim(potentials(l))//': '//trim(outcome%reason))
-         call check_that(all(abs(pressure) < 1e3_dp) .and. all(gap >= 0.0_dp), 'no NaN', &
-            [maxval(abs(pressure)), minval(gap)])
-         call solver%destroy()
+         call new_waves(c, 80, 66, 1.0_dp, 0.9_dp, 0.02_dp)
+         c%height = c%height + 0.002_dp*noise(80, 66)
+         call c%touch()
+         c%problem%target = 0.01_dp
+         c%problem%potential = potential_of(trim(potentials(l)), 2e-3_dp, 1e-3_dp)
+         call c%converge('strong '//trim(potentials(l)))
+         call check_order(c%outcome%residual, '<=', 1e-6_dp, 'strong: the residual')
+         call check_that(all(abs(c%pressure) < 1e3_dp) .and. all(c%gap >= 0.0_dp), 'no NaN', &
+            [maxval(abs(c%pressure)), minval(c%gap)])
+         call c%destroy()
       end do
    end subroutine strong_attraction_on_rough_surface
 
@@ -513,79 +453,60 @@ contains
    !> it cannot miss it: it solves again and again with the attraction of the gap before, which is less than
    !> that of any solution below. The solver must also need few transforms.
    subroutine attraction_closes_as_in_a_slow_motion()
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), slow(:, :), pressure(:, :), past(:, :)
+      type(contact_type) :: c, slow
+      real(dp), allocatable :: past(:, :)
       real(dp), parameter :: energy = 2.5e-4_dp, range = 4e-3_dp
-      real(dp) :: level, change
+      real(dp) :: change
       integer :: k
 
-      grid = new_grid(64, 60, 1.0_dp, 0.9_dp, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = waves(grid, 0.015_dp) + 0.001_dp*noise(64, 60)
-      problem%modulus = modulus
-      problem%target = 0.01_dp
-      problem%tolerance = 1e-7_dp
-      slow = maxval(height) - height
-      pressure = 0.0_dp*slow
-      call solver%solve(problem, height, slow, pressure, level, outcome)
-      gap = slow
+      call new_waves(slow, 64, 60, 1.0_dp, 0.9_dp, 0.015_dp)
+      slow%height = slow%height + 0.001_dp*noise(64, 60)
+      call slow%touch()
+      slow%problem%target = 0.01_dp
+      slow%problem%tolerance = 1e-7_dp
+      call slow%solve()
+      call new_contact(c, slow%grid, poisson, modulus, slow%height)
+      c%gap = slow%gap
       do k = 1, 400
-         past = -energy/range*exp(-slow/range)
+         past = -energy/range*exp(-slow%gap/range)
          ! A traction from the past also moves the mean, which does not matter here.
-         problem%target = 0.01_dp - sum(past)/size(past)
-         change = sum(slow)
-         call solver%solve(problem, height, slow, pressure, level, outcome, past)
-         call check_that(outcome%converged, 'slow: '//trim(outcome%reason))
-         if (abs(change - sum(slow)) < 1e-9_dp) exit
+         slow%problem%target = 0.01_dp - sum(past)/size(past)
+         change = sum(slow%gap)
+         call slow%converge('slow', past)
+         if (abs(change - sum(slow%gap)) < 1e-9_dp) exit
       end do
-      problem%target = 0.01_dp
-      problem%tolerance = 1e-6_dp
-      problem%potential = potential_of('exponential', energy, range)
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(outcome%converged, trim(outcome%reason))
-      call check_close(maxval(abs(gap - slow)), 0.0_dp, 1e-2_dp*range, 'the first solution on the way')
-      call check_that(count(gap == 0.0_dp) > 200, 'a contact', [real(count(gap == 0.0_dp), dp)])
-      call check_order(real(outcome%ffts, dp), '<=', 80.0_dp, 'transforms')
-      call solver%destroy()
+      c%problem%target = 0.01_dp
+      c%problem%potential = potential_of('exponential', energy, range)
+      call c%converge('from the state without adhesion')
+      call check_close(maxval(abs(c%gap - slow%gap)), 0.0_dp, 1e-2_dp*range, 'the first solution on the way')
+      call check_that(count(c%gap == 0.0_dp) > 200, 'a contact', [real(count(c%gap == 0.0_dp), dp)])
+      call check_order(real(c%outcome%ffts, dp), '<=', 80.0_dp, 'transforms')
+      call slow%destroy()
+      call c%destroy()
    end subroutine attraction_closes_as_in_a_slow_motion
 
    !> Approach and retreat at prescribed level, each solve from the state before: there is attraction before
    !> contact, the surfaces separate at the end, and the retreat needs more work than the approach returns.
    subroutine pull_off_takes_more_work_than_approach()
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      real(dp) :: level, loads(0:40), levels(0:40), work
+      type(contact_type) :: c
+      real(dp) :: loads(0:40), levels(0:40), work
       integer :: k
 
-      grid = new_grid(48, 40, 1.0_dp, 0.9_dp, boundary_periodic)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = waves(grid, 0.02_dp)
-      problem%modulus = modulus
-      problem%control = control_approach
-      problem%potential = potential_of('exponential', 2e-3_dp, 0.008_dp)
-      gap = maxval(height) - height
-      pressure = 0.0_dp*gap
+      call new_waves(c, 48, 40, 1.0_dp, 0.9_dp, 0.02_dp)
+      c%problem%control = control_approach
+      c%problem%potential = potential_of('exponential', 2e-3_dp, 0.008_dp)
       do k = 0, 40
-         levels(k) = -maxval(height) + 0.02_dp - 0.004_dp*abs(k - 20)
-         problem%target = levels(k)
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged, 'loop: '//trim(outcome%reason))
-         loads(k) = sum(pressure)/size(pressure)
+         levels(k) = -maxval(c%height) + 0.02_dp - 0.004_dp*abs(k - 20)
+         c%problem%target = levels(k)
+         call c%converge('loop')
+         loads(k) = sum(c%pressure)/size(c%pressure)
       end do
       call check_that(all(abs(loads([0, 40])) < 1e-3_dp), 'apart at the ends', loads([0, 40]))
       call check_order(minval(loads), '<', -5e-3_dp, 'there is a pull-off')
       call check_order(maxval(abs(loads - loads(40:0:-1))), '>', 1e-3_dp, 'there is hysteresis')
       work = sum(0.5_dp*(loads(1:) + loads(:39))*(levels(1:) - levels(:39)))
       call check_order(work, '>', 0.0_dp, 'the loop loses energy')
-      call solver%destroy()
+      call c%destroy()
    end subroutine pull_off_takes_more_work_than_approach
 
    !> The ratio of the form s.B_h s of the local model to s.B s, for single waves of all lengths and
@@ -633,41 +554,33 @@ contains
 
    !> Detachment, a closed gap, and an unknown method are reported.
    subroutine detached_closed_and_refused()
-      type(grid_type) :: grid
+      type(contact_type) :: c
       type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
+      type(grid_type) :: grid
       type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      real(dp) :: level
       integer :: k
 
-      grid = new_grid(32, 24, 1.0_dp, 0.8_dp, boundary_periodic)
-      height = waves(grid, 0.02_dp)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
+      call new_waves(c, 32, 24, 1.0_dp, 0.8_dp, 0.02_dp)
       do k = 1, size(potentials)
-         problem%modulus = modulus
-         problem%control = control_pressure
-         problem%target = 0.02_dp
-         problem%potential = potential_of(trim(potentials(k)), 2e-3_dp, 0.01_dp)
-         gap = maxval(height) - height
-         pressure = 0.0_dp*gap
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged, 'pressed: '//trim(outcome%reason))
-         problem%target = -1e-3_dp
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged, trim(potentials(k))//' holds: '//trim(outcome%reason))
-         call check_close(sum(pressure)/size(pressure), -1e-3_dp, 1e-14_dp, 'a pull is held')
-         problem%target = -0.3_dp
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%reason == reason_detached .and. .not. outcome%converged, &
-            trim(potentials(k))//' lets go: '//trim(outcome%reason))
+         c%problem%control = control_pressure
+         c%problem%target = 0.02_dp
+         c%problem%potential = potential_of(trim(potentials(k)), 2e-3_dp, 0.01_dp)
+         call c%touch()
+         call c%converge('pressed')
+         c%problem%target = -1e-3_dp
+         call c%converge(trim(potentials(k))//' holds')
+         call check_close(sum(c%pressure)/size(c%pressure), -1e-3_dp, 1e-14_dp, 'a pull is held')
+         c%problem%target = -0.3_dp
+         call c%solve()
+         call check_that(c%outcome%reason == reason_detached .and. .not. c%outcome%converged, &
+            trim(potentials(k))//' lets go: '//trim(c%outcome%reason))
       end do
-      problem%control = control_approach
-      problem%target = -sum(height)/size(height) + 1e-3_dp
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(outcome%reason == reason_closed, 'no gap left')
-      call solver%destroy()
+      c%problem%control = control_approach
+      c%problem%target = -sum(c%height)/size(c%height) + 1e-3_dp
+      call c%solve()
+      call check_that(c%outcome%reason == reason_closed, 'no gap left')
+      grid = c%grid
+      call c%destroy()
       call new_adhesion_solver(solver, grid, normal_half_space(poisson), error, method='slow')
       call check_error(error, 'thesis', 'unknown method')
       call solver%destroy()
@@ -679,40 +592,19 @@ contains
 
    !> One and two threads give the same bits.
    subroutine same_bits_on_two_threads()
-      type(grid_type) :: grid
-      real(dp), allocatable :: height(:, :), first(:, :), second(:, :)
+      type(contact_type) :: c(2)
+      integer :: threads
 
-      grid = new_grid(160, 131, 1.0_dp, 0.7_dp, boundary_periodic)
-      height = waves(grid, 0.01_dp)
-      call one(1, first)
-      call one(2, second)
-      call set_threads(0)
-      call check_that(all(first == second), 'threads do not matter')
-
-   contains
-
-      subroutine one(threads, gap)
-         integer, intent(in) :: threads
-         real(dp), allocatable, intent(out) :: gap(:, :)
-         type(adhesion_solver_type) :: solver
-         type(adhesion_problem_type) :: problem
-         type(solver_result_type) :: outcome
-         type(error_type), allocatable :: error
-         real(dp), allocatable :: pressure(:, :)
-         real(dp) :: level
-
+      do threads = 1, 2
          call set_threads(threads)
-         call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-         problem%modulus = modulus
-         problem%target = 0.02_dp
-         problem%potential = potential_of('exponential', 1e-3_dp, 0.02_dp)
-         gap = maxval(height) - height
-         pressure = 0.0_dp*gap
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged, trim(outcome%reason))
-         call solver%destroy()
-      end subroutine one
-
+         call new_waves(c(threads), 160, 131, 1.0_dp, 0.7_dp, 0.01_dp)
+         c(threads)%problem%target = 0.02_dp
+         c(threads)%problem%potential = potential_of('exponential', 1e-3_dp, 0.02_dp)
+         call c(threads)%converge('threads')
+         call c(threads)%destroy()
+      end do
+      call set_threads(0)
+      call check_that(all(c(1)%gap == c(2)%gap), 'threads do not matter')
    end subroutine same_bits_on_two_threads
 
 end module test_adhesion_cg

@@ -4,8 +4,9 @@
 !> (pi gamma_0 R^2/K)^(1/3), loads in pi gamma_0 R, and Maugis's lambda = 2 gamma_0/z_0.
 module test_adhesion_free
    use adhesion_cg, only : adhesion_solver_type, new_adhesion_solver
+   use adhesion_fixture, only : contact_type, new_contact
    use adhesion_potential, only : adhesive_energy, adhesive_slope, new_adhesion_potential
-   use adhesion_state, only : adhesion_problem_type, control_approach, reason_detached
+   use adhesion_state, only : control_approach, reason_detached
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
    use asperity_errors, only : error_type
@@ -14,7 +15,6 @@ module test_adhesion_free
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
    use regular_grid, only : boundary_free, grid_type, new_grid
-   use solver_result, only : solver_result_type
    implicit none
    private
 
@@ -65,6 +65,22 @@ contains
       end do
    end function paraboloid
 
+   !> A contact with such a paraboloid at first touch, on a free grid.
+   subroutine new_paraboloid(contact, nx, ny, lx, ly, name, range)
+      type(contact_type), intent(out) :: contact
+      integer, intent(in) :: nx, ny
+      real(dp), intent(in) :: lx, ly
+      character(*), intent(in) :: name             !! of the potential
+      real(dp), intent(in) :: range                !! z_0
+      type(grid_type) :: grid
+      type(error_type), allocatable :: error
+
+      grid = new_grid(nx, ny, lx, ly, boundary_free)
+      call new_contact(contact, grid, poisson, modulus, paraboloid(grid))
+      call new_adhesion_potential(contact%problem%potential, name, 1.0_dp/pi, range, error)
+      call check_no_error(error, name)
+   end subroutine new_paraboloid
+
    !> Displacement as the sum over Love's coefficients.
    function displacement_sum(grid, pressure) result(u)
       type(grid_type), intent(in) :: grid
@@ -94,63 +110,50 @@ contains
    !> contact.
    subroutine solution_meets_its_conditions(name)
       character(*), intent(in) :: name
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :), past(:, :), true_gap(:, :), &
-         other(:, :)
-      real(dp) :: level, scale, force, deep
+      type(contact_type) :: c
+      real(dp), allocatable :: past(:, :), true_gap(:, :), other(:, :)
+      real(dp) :: scale, force, deep
       integer :: i, j
 
-      grid = new_grid(27, 22, 5.0_dp, 6.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      call check_no_error(error, 'solver')
-      height = paraboloid(grid)
-      do j = 1, grid%ny
-         do i = 1, grid%nx
-            height(i, j) = height(i, j) + 0.1_dp*cos(3.0_dp*i*grid%dx + 2.0_dp*j*grid%dy)
+      call new_paraboloid(c, 27, 22, 5.0_dp, 6.0_dp, name, 0.6_dp)
+      do j = 1, c%grid%ny
+         do i = 1, c%grid%nx
+            c%height(i, j) = c%height(i, j) + 0.1_dp*cos(3.0_dp*i*c%grid%dx + 2.0_dp*j*c%grid%dy)
          end do
       end do
-      past = 0.05_dp*cos(height)
-      call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, 0.6_dp, error)
-      problem%modulus = modulus
+      past = 0.05_dp*cos(c%height)
       force = 0.4_dp
-      problem%target = force/(grid%lx*grid%ly)
-      problem%tolerance = 1e-7_dp
-      pressure = 0.0_dp*height
-      gap = pressure
-      level = 0.0_dp
-      call solver%solve(problem, height, gap, pressure, level, outcome, past)
-      call check_that(outcome%converged, name//': '//trim(outcome%reason))
-      call check_close(sum(pressure)*grid%dx*grid%dy, force, 1e-6_dp, name//': load')
-      true_gap = displacement_sum(grid, pressure + past)/modulus - height - level
+      c%problem%target = force/(c%grid%lx*c%grid%ly)
+      c%problem%tolerance = 1e-7_dp
+      call c%touch()
+      call c%converge(name, past)
+      call check_close(sum(c%pressure)*c%grid%dx*c%grid%dy, force, 1e-6_dp, name//': load')
+      true_gap = displacement_sum(c%grid, c%pressure + past)/modulus - c%height - c%level
       scale = 1.0_dp/(pi*0.6_dp)
-      call check_close(maxval(abs(true_gap - gap)), 0.0_dp, 3e-7_dp*0.6_dp, name//': gap')
-      call check_that(any(gap == 0.0_dp) .and. any(gap > 0.0_dp), name//': a partial contact')
+      call check_close(maxval(abs(true_gap - c%gap)), 0.0_dp, 3e-7_dp*0.6_dp, name//': gap')
+      call check_that(any(c%gap == 0.0_dp) .and. any(c%gap > 0.0_dp), name//': a partial contact')
       call check_close(maxval(abs(min(true_gap/0.6_dp, &
-         (pressure + adhesive_slope(problem%potential, max(true_gap, 0.0_dp)))/scale))), &
-         outcome%residual, 1e-10_dp + outcome%load_error, name//': true residual, as returned')
-      call check_order(outcome%residual, '<=', 1e-7_dp, name//': true residual')
+         (c%pressure + adhesive_slope(c%problem%potential, max(true_gap, 0.0_dp)))/scale))), &
+         c%outcome%residual, 1e-10_dp + c%outcome%load_error, name//': true residual, as returned')
+      call check_order(c%outcome%residual, '<=', 1e-7_dp, name//': true residual')
 
-      problem%control = control_approach
-      problem%target = level
-      other = pressure
-      call solver%solve(problem, height, gap, other, level, outcome, past)
-      call check_that(outcome%converged, name//': level: '//trim(outcome%reason))
-      call check_close(maxval(abs(other - pressure)), 0.0_dp, 1e-5_dp*scale, name//': controls')
-      deep = level + 0.3_dp
-      problem%target = deep
-      call solver%solve(problem, height, gap, other, level, outcome, past)
-      call check_that(outcome%converged .and. sum(other) > sum(pressure), name//': deeper', &
-         [sum(other), sum(pressure)])
-      problem%full_contact = .true.
-      gap = 0.0_dp
-      call solver%solve(problem, height, gap, other, level, outcome, past)
-      call check_that(outcome%converged, name//': from full contact: '//trim(outcome%reason))
-      call check_close(level, deep, 0.0_dp, name//': the level is kept')
-      call solver%destroy()
+      c%problem%control = control_approach
+      c%problem%target = c%level
+      other = c%pressure
+      call c%solver%solve(c%problem, c%height, c%gap, other, c%level, c%outcome, past)
+      call check_that(c%outcome%converged, name//': level: '//trim(c%outcome%reason))
+      call check_close(maxval(abs(other - c%pressure)), 0.0_dp, 1e-5_dp*scale, name//': controls')
+      deep = c%level + 0.3_dp
+      c%problem%target = deep
+      call c%solver%solve(c%problem, c%height, c%gap, other, c%level, c%outcome, past)
+      call check_that(c%outcome%converged .and. sum(other) > sum(c%pressure), name//': deeper', &
+         [sum(other), sum(c%pressure)])
+      c%problem%full_contact = .true.
+      c%gap = 0.0_dp
+      call c%solver%solve(c%problem, c%height, c%gap, other, c%level, c%outcome, past)
+      call check_that(c%outcome%converged, name//': from full contact: '//trim(c%outcome%reason))
+      call check_close(c%level, deep, 0.0_dp, name//': the level is kept')
+      call c%destroy()
    end subroutine solution_meets_its_conditions
 
    !> One sphere under a load: contact radius from the number of cells in contact.
@@ -161,27 +164,15 @@ contains
       real(dp), intent(in) :: range                !! z_0
       real(dp), intent(in) :: load                 !! in pi gamma_0 R
       real(dp), intent(out) :: radius, level
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
+      type(contact_type) :: c
 
-      grid = new_grid(n, n, side, side, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = paraboloid(grid)
-      call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, range, error)
-      problem%modulus = modulus
-      problem%target = load/side**2
-      pressure = 0.0_dp*height
-      gap = pressure
-      level = 0.0_dp
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(outcome%converged, 'sphere: '//trim(outcome%reason))
-      call check_close(sum(pressure)*grid%dx*grid%dy, load, 1e-5_dp, 'sphere: load')
-      radius = sqrt(count(gap == 0.0_dp)*grid%dx*grid%dy/pi)
-      call solver%destroy()
+      call new_paraboloid(c, n, n, side, side, name, range)
+      c%problem%target = load/side**2
+      call c%converge('sphere')
+      call check_close(sum(c%pressure)*c%grid%dx*c%grid%dy, load, 1e-5_dp, 'sphere: load')
+      radius = sqrt(count(c%gap == 0.0_dp)*c%grid%dx*c%grid%dy/pi)
+      level = c%level
+      call c%destroy()
    end subroutine solve_sphere
 
    !> Hertz, JKR and DMT: a^3 = F, a^3 - sqrt(6) a^1.5 = F, a^3 - 2 = F.
@@ -292,71 +283,46 @@ contains
       integer, intent(in) :: n
       real(dp), intent(in) :: first, step
       real(dp), intent(out) :: least
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      real(dp) :: level, range, side, load
+      type(contact_type) :: c
+      real(dp) :: range, side, load
       integer :: k
 
       range = 2.0_dp/(pi*lambda)
       side = max(4.0_dp, 2.6_dp*sqrt(2*range))
-      grid = new_grid(n, n, side, side, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = paraboloid(grid)
-      call new_adhesion_potential(problem%potential, name, 1.0_dp/pi, range, error)
-      problem%modulus = modulus
-      problem%control = control_approach
-      pressure = 0.0_dp*height
-      gap = pressure
+      call new_paraboloid(c, n, n, side, side, name, range)
+      c%problem%control = control_approach
       least = 0.0_dp
       do k = 0, 9
-         problem%target = first - step*k
-         level = problem%target
-         call solver%solve(problem, height, gap, pressure, level, outcome)
-         call check_that(outcome%converged, 'pull-off '//name//': '//trim(outcome%reason))
-         load = sum(pressure)*grid%dx*grid%dy
+         c%problem%target = first - step*k
+         call c%converge('pull-off '//name)
+         load = sum(c%pressure)*c%grid%dx*c%grid%dy
          least = min(least, load)
       end do
-      call solver%destroy()
+      call c%destroy()
    end subroutine draw_off
 
    !> dE/d(level) = sum P.
    subroutine force_is_derivative_of_energy()
-      type(grid_type) :: grid
-      type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      real(dp) :: level, load, energy(-1:1), h
+      type(contact_type) :: c
+      real(dp) :: load, energy(-1:1), h
       integer :: k, step
 
-      grid = new_grid(24, 31, 5.0_dp, 6.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = paraboloid(grid)
-      call new_adhesion_potential(problem%potential, 'exponential', 1.0_dp/pi, 0.5_dp, error)
-      problem%modulus = modulus
-      problem%control = control_approach
-      problem%tolerance = 1e-9_dp
-      pressure = 0.0_dp*height
-      gap = pressure
+      call new_paraboloid(c, 24, 31, 5.0_dp, 6.0_dp, 'exponential', 0.5_dp)
+      c%problem%control = control_approach
+      c%problem%tolerance = 1e-9_dp
       h = 1e-4_dp
       load = 0.0_dp
       do k = 1, 3
          do step = -1, 1
-            problem%target = 0.7_dp*(k - 2) + step*h
-            call solver%solve(problem, height, gap, pressure, level, outcome)
-            call check_that(outcome%converged, 'energy: '//trim(outcome%reason))
-            energy(step) = sum(0.5_dp*pressure*(height + gap + level) &
-               + adhesive_energy(problem%potential, gap))
-            if (step == 0) load = sum(pressure)
+            c%problem%target = 0.7_dp*(k - 2) + step*h
+            call c%converge('energy')
+            energy(step) = sum(0.5_dp*c%pressure*(c%height + c%gap + c%level) &
+               + adhesive_energy(c%problem%potential, c%gap))
+            if (step == 0) load = sum(c%pressure)
          end do
          call check_close((energy(1) - energy(-1))/(2*h), load, 2e-3_dp, 'force from the energy')
       end do
-      call solver%destroy()
+      call c%destroy()
    end subroutine force_is_derivative_of_energy
 
    !> Tabor parameters 5 and 8 on a mesh that is too coarse for them: the solver converges nevertheless.
@@ -386,35 +352,21 @@ contains
 
    !> Under a prescribed pull the contact holds or detaches. A line contact is refused.
    subroutine held_detached_and_refused()
-      type(grid_type) :: grid
+      type(contact_type) :: c
       type(adhesion_solver_type) :: solver
-      type(adhesion_problem_type) :: problem
-      type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
-      real(dp), allocatable :: height(:, :), gap(:, :), pressure(:, :)
-      real(dp) :: level
 
-      grid = new_grid(40, 40, 5.0_dp, 5.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
-      height = paraboloid(grid)
-      call new_adhesion_potential(problem%potential, 'exponential', 1.0_dp/pi, 0.4_dp, error)
-      problem%modulus = modulus
-      problem%target = 1.0_dp/25
-      pressure = 0.0_dp*height
-      gap = pressure
-      level = 0.0_dp
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(outcome%converged, 'pressed')
-      problem%target = -1.3_dp/25
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(outcome%converged, 'a pull is held: '//trim(outcome%reason))
-      problem%target = -2.2_dp/25
-      call solver%solve(problem, height, gap, pressure, level, outcome)
-      call check_that(.not. outcome%converged .and. outcome%reason == reason_detached, &
-         'lets go: '//trim(outcome%reason))
-      call solver%destroy()
-      grid = new_grid(40, 1, 5.0_dp, 5.0_dp, boundary_free)
-      call new_adhesion_solver(solver, grid, normal_half_space(poisson), error)
+      call new_paraboloid(c, 40, 40, 5.0_dp, 5.0_dp, 'exponential', 0.4_dp)
+      c%problem%target = 1.0_dp/25
+      call c%converge('pressed')
+      c%problem%target = -1.3_dp/25
+      call c%converge('a pull is held')
+      c%problem%target = -2.2_dp/25
+      call c%solve()
+      call check_that(.not. c%outcome%converged .and. c%outcome%reason == reason_detached, &
+         'lets go: '//trim(c%outcome%reason))
+      call c%destroy()
+      call new_adhesion_solver(solver, new_grid(40, 1, 5.0_dp, 5.0_dp, boundary_free), normal_half_space(poisson), error)
       call check_error(error, 'ny > 1', 'free line contact')
    end subroutine held_detached_and_refused
 

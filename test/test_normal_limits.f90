@@ -148,6 +148,16 @@ contains
       end do
    end subroutine two_summits_share_the_load
 
+   !> Check that the solver converged to a state without pressure.
+   subroutine check_no_pressure(solution, what)
+      type(solution_type), intent(in) :: solution
+      character(*), intent(in) :: what
+
+      call check_that(solution%outcome%converged, what//': '//solution%outcome%reason)
+      call check_that(all(abs(solution%pressure) <= 0.0_dp), what//': no pressure', &
+         [maxval(abs(solution%pressure))])
+   end subroutine check_no_pressure
+
    !> A load of zero is first touch.
    subroutine zero_load_just_touches(thesis)
       logical, intent(in) :: thesis
@@ -161,9 +171,7 @@ contains
          grid = new_grid(20, 33, 1.0_dp, 1.0_dp, merge(boundary_periodic, boundary_free, k == 1))
          call rough_problem(grid, 4.0_dp, 0.0_dp, problem, h)
          call run_problem(grid, problem, h, s, thesis)
-         call check_that(s%outcome%converged, 'no load: '//s%outcome%reason)
-         call check_that(all(abs(s%pressure) <= 0.0_dp), 'no load: no pressure', &
-            [maxval(abs(s%pressure))])
+         call check_no_pressure(s, 'no load')
          call check_close(s%level, -maxval(h), 1e-15_dp, 'no load: first touch')
          call check_close(minval(s%gap), 0.0_dp, 1e-15_dp, 'no load: touching')
       end do
@@ -184,9 +192,7 @@ contains
          problem%control = control_approach
          problem%target = -maxval(h) - 0.01_dp
          call run_problem(grid, problem, h, s, thesis)
-         call check_that(s%outcome%converged, 'no contact: '//s%outcome%reason)
-         call check_that(all(abs(s%pressure) <= 0.0_dp), 'no contact: no pressure', &
-            [maxval(abs(s%pressure))])
+         call check_no_pressure(s, 'no contact')
          call check_close(minval(s%gap), 0.01_dp, 1e-14_dp, 'no contact: the distance')
       end do
    end subroutine approach_that_does_not_reach
