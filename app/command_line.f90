@@ -233,7 +233,7 @@ contains
             command%verb//' needs an input: asperity '//command%verb//' CASE.nml')
       case ('info')
          if (.not. allocated(command%path)) call add_fault(error, error_input, &
-            'asperity: info needs a result: asperity info RESULT.h5')
+            'asperity: info needs a result or a height map: asperity info FILE.h5')
       case default                                   ! template: a name is optional
          continue
       end select
@@ -300,8 +300,9 @@ contains
             'Without a name, list the templates.'//nl//nl// &
             '  --reference  print all groups and variables as Markdown'//nl
       case ('info')
-         text = 'asperity info RESULT.h5'//nl//nl// &
-            'Describe a result: case, grid, phases, last row, and whether the run is finished.'//nl
+         text = 'asperity info FILE.h5'//nl//nl// &
+            'Describe a result: case, grid, phases, last row, and whether the run is finished;'//nl// &
+            'or a height map: size, heights, and the steps of its processing.'//nl
       case default
          text = 'Asperity: contact of a viscoelastic solid with a rough surface'//nl//nl// &
             'asperity run CASE.nml [--output FILE.h5] [--threads N] [--restart] [--overwrite]'//nl// &

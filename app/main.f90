@@ -119,7 +119,7 @@ contains
       call agree(error)
    end subroutine check
 
-   !> Carry out `asperity info RESULT.h5`. A result that is damaged may still have a part that can be described.
+   !> Carry out `asperity info FILE.h5`. A result that is damaged may still have a part that can be described.
    subroutine info(error)
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: saying

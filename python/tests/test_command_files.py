@@ -1,15 +1,22 @@
 """The man page and the shell completions agree with the commands of the program."""
 
 import os
+import pty
 import re
 import resource
+import select
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import PATIENCE, ROOT
+
+from asperity.results.column_types import RowColumns
+from asperity.results.field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 
 SHARE = ROOT / "share"
 PYTHON_VERBS = ["plot", "report", "watch", "import", "fit"]
@@ -70,11 +77,60 @@ def test_completion_in_bash(program, tmp_path):
         (tmp_path / name).touch()
     (tmp_path / "results").mkdir()
     assert completed(program, tmp_path, "re") == {"report"}
-    assert completed(program, tmp_path, "run", "") == {"road.nml", "a road.nml", "results/"}
-    assert completed(program, tmp_path, "info", "r") == {"road.h5", "results/"}
+    assert completed(program, tmp_path, "run", "") == {"road.nml", "a road.nml", "results"}
+    assert completed(program, tmp_path, "info", "r") == {"road.h5", "results"}
     assert completed(program, tmp_path, "run", "--r") == {"--restart"}
     assert "hertz" in completed(program, tmp_path, "template", "h")
     assert "--history" in completed(program, tmp_path, "plot", "--h")
+    # Values of options: allowed words, names, files, and nothing for numbers.
+    assert completed(program, tmp_path, "import", "--level", "") == {"none", "mean", "tilt",
+                                                                     "curvature"}
+    assert completed(program, tmp_path, "friction", "--join", "m") == {"mirror"}
+    assert completed(program, tmp_path, "import", "--periodic", "") == {"tukey", "hann"}
+    assert completed(program, tmp_path, "plot", "road.h5", "--field", "g") == {"gap"}
+    assert completed(program, tmp_path, "plot", "road.h5", "--history", "en") == {
+        "energy", "energy_elastic", "energy_adhesive", "energy_kinetic", "energy_radiated"}
+    assert completed(program, tmp_path, "run", "road.nml", "--output", "r") == {"road.h5",
+                                                                                "results"}
+    assert completed(program, tmp_path, "run", "road.nml", "--threads", "") == set()
+    assert completed(program, tmp_path, "friction", "r.h5", "--speeds", "") == set()
+    assert completed(program, tmp_path, "run", "--quiet", "ro") == {"road.nml"}
+
+
+def test_bash_quotes_names_with_blanks(program, tmp_path):
+    if not shutil.which("bash"):
+        pytest.skip("bash is not installed")
+    (tmp_path / "a road.nml").touch()
+    (tmp_path / "start").write_text(
+        f"PATH={Path(program).parent}:$PATH; PS1='> '; source {SHARE / 'asperity.bash'}\n")
+    process, terminal = pty.fork()
+    if process == 0:
+        os.chdir(tmp_path)
+        os.environ["TERM"] = "dumb"
+        os.execvp("bash", ["bash", "--rcfile", "start", "-i"])
+    try:
+        os.write(terminal, b"asperity run a\\ r\t")
+        shown, until = b"", time.monotonic() + PATIENCE
+        while b"nml" not in shown.split(b"asperity run")[-1] and time.monotonic() < until:
+            if select.select([terminal], [], [], 0.1)[0]:
+                shown += os.read(terminal, 1024)
+        assert b"asperity run a\\ road.nml" in shown
+    finally:
+        os.kill(process, signal.SIGKILL)
+        os.waitpid(process, 0)
+        os.close(terminal)
+
+
+@pytest.mark.parametrize("name", ["asperity.bash", "_asperity", "asperity.fish"])
+def test_completions_know_the_names_of_fields_and_columns(name):
+    words = set(re.findall(r"\w+", (SHARE / name).read_text()))
+    fields = {*NORMAL_FIELDS, *TANGENTIAL_FIELDS}
+    columns = set(RowColumns.__annotations__)
+    assert fields | columns <= words
+    # No name is left from an earlier version: every other word with an underscore is of the shell.
+    left = {word for word in words - fields - columns if re.fullmatch(r"[a-z]+(_[a-z]+)+", word)}
+    assert not {word for word in left if word.split("_")[0] in {
+        column.split("_")[0] for column in columns}}
 
 
 def test_python_does_its_commands(program):

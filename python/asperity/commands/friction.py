@@ -51,9 +51,9 @@ def add_friction(verbs: Any) -> None:
                     " with Persson's theory. The runs are in a folder next to the output. After an"
                     " interruption the same command resumes where it stopped.")
     parser.add_argument("roads", metavar="ROAD", nargs="+",
-                        help="a height map in any format that `import` reads; spectrum:FILE;"
-                             " self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,"
-                             "rms_slope=0.2")
+                        help="a height map in any format that `import` reads; spectrum:FILE; or"
+                             " self_affine:NAME=VALUE,... with hurst, wavelength_long,"
+                             " wavelength_short, and rms_slope or rms_height")
     parser.add_argument("--material", required=True, metavar="RUBBER", type=Path,
                         help="a namelist with &material, or a DMA table")
     _add_points(parser)

@@ -16,7 +16,8 @@ def add_plot(verbs: Any) -> None:
         description="Draws a result, by default an overview, into RESULT.png. In a case with"
                     " friction it shows friction, contact area, stick area and sliding speed over"
                     " time, and the last maps of pressure and of stick and slip. Otherwise it shows"
-                    " the contact area, and the last maps of pressure and gap.")
+                    " the contact area, and the last maps of pressure and gap. A curve of steady"
+                    " states is drawn over the sliding speed.")
     plot.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
     plot.add_argument("-o", "--output", metavar="PNG", type=Path,
                       help="picture to write (.png, .pdf, .svg; a film .gif, .mp4);"
