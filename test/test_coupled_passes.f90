@@ -76,7 +76,7 @@ contains
       call mark_contact(.false., pressure, gap, contact)
       call check_that(all(contact(:, 1) == [2, 0, 1, 1, 0]), 'the pressure decides, and a cell that slipped keeps its mark')
       rule = new_edge_rule(none, soft, reach/(soft*0.1_dp), 0.1_dp)
-      call check_close(rule%reach, reach, 1.0e-9_dp, 'reach')
+      call check_close(rule%share_length, reach, 1.0e-9_dp, 'length of a share')
       call rule%decide(pressure, gap, share)
       call check_that(all(nint(share(:, 1)) == [1, 0, 0, 1, 1]), 'the gap decides, too')
       call mark_shares(share, contact)
@@ -225,7 +225,7 @@ contains
       call control%judge(1.0e-3_dp)
       call check_close(control%accuracy, 1.0e-5_dp, 1.0e-18_dp, 'finer where the mismatch stays')
       call control%judge(0.1_dp)
-      call check_that(control%forget .and. .not. control%go_back, 'astray')
+      call check_that(control%forget .and. .not. control%go_back, 'diverged')
       do i = 1, 15
          call control%judge(1.0e-3_dp)
          if (control%go_back) exit

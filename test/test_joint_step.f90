@@ -72,7 +72,7 @@ contains
       call check_close(rules%number_of(width, .true., 9.0e5_dp, 0.0_dp), width + 1.0e-6_dp, 1.0e-18_dp, 'back')
       ends = rules%share_of(width, [0.25_dp*width, 2.0_dp*width])
       call check_close(maxval(abs(ends - [0.25_dp, 1.0_dp])), 0.0_dp, 1.0e-12_dp, 'shares')
-      left = rules%lacking(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [1.0e-6_dp, 0.0_dp], [0.75e5_dp, 0.0_dp])
+      left = rules%traction_error(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [1.0e-6_dp, 0.0_dp], [0.75e5_dp, 0.0_dp])
       call check_close(norm2(left), 0.0_dp, 1.0e-6_dp, 'slips at its share of the strength')
       call check_that(rules%slips(0.25_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'it counts as slip')
       call check_that(.not. rules%slips(0.5_dp, 0.0_dp, [0.0_dp, 0.0_dp], [0.75e5_dp, 0.0_dp]), 'it counts as stick')

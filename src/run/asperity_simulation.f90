@@ -175,7 +175,7 @@ contains
          call sums%add(parts(k)%dt, self%state%row, self%tangential%slip)
          if (.not. self%converged) exit
       end do
-      if (size(parts) > 1) call sums%hand_out(self%state%row, self%tangential%slip)
+      if (size(parts) > 1) call sums%put_into(self%state%row, self%tangential%slip)
       call watch_cells(self, plan, self%warnings)
       call look_for_overflow(self)
       self%finished = self%state%schedule%phase > size(self%case%phases)
@@ -302,25 +302,25 @@ contains
       type(found_step_type), intent(in) :: found
       character(:), allocatable :: message, advice
 
-      associate (solver => self%case%solver, left => found%mismatch)
-         if (.not. self%converged .or. left <= solver%tolerance) return
+      associate (solver => self%case%solver, mismatch => found%mismatch)
+         if (.not. self%converged .or. mismatch <= solver%tolerance) return
          if (solver%passes > 0) self%allowed = max(self%allowed, large_mismatch)
          if (solver%coupling_tolerance > 0.0_dp) self%allowed = max(solver%tolerance, solver%coupling_tolerance)
          advice = advice_on_passes(self)
-         if (.not. left <= self%allowed) then
+         if (.not. mismatch <= self%allowed) then
             self%converged = .false.
-            self%residual = left
+            self%residual = mismatch
             self%reason = 'the '//to_text(found%passes)//' passes of the step did not settle. '//advice
-         else if (left > large_mismatch .and. .not. self%state%passes_reported) then
+         else if (mismatch > large_mismatch .and. .not. self%state%passes_reported) then
             self%state%passes_reported = .true.
-            message = 'the passes of the step did not settle: residual_coupling is '//to_text(left)// &
+            message = 'the passes of the step did not settle: residual_coupling is '//to_text(mismatch)// &
                ' after '//to_text(found%passes)//'. '//advice
             call add_warning(self%warnings, self%state%schedule%row, plan%time, message)
          end if
       end associate
    end subroutine look_at_passes
 
-   !> A row that contains a number that is not finite has not converged.
+   !> Note that the row has not converged if it contains a number that is not finite.
    subroutine look_for_overflow(self)
       type(simulation_type), intent(inout) :: self
 

@@ -1,6 +1,7 @@
 !> The mean tangential motion of a block with mass: its state, the integration in time, and its energy.
 !>
-!> The mean traction T of the interface strains the block and moves its mass m (per area):
+!> A prime marks the end of a step. The mean traction T of the interface deforms the block and accelerates its mass m
+!> per area by the force f:
 !>
 !>    T' + T_h = Q U'/h + f',    f' = m ((1 - alpha) a' + alpha a)
 !>    v' = v + dt ((1 - gamma) a + gamma a')
@@ -13,9 +14,8 @@
 !> than the steps decay by the factor `fastest` = (1 + alpha)/(1 - alpha) per step. With the trapezoidal rule
 !> (alpha = 0) they would never decay once the block sticks.
 !>
-!> a lags behind the acceleration, and is useless if the acceleration jumps. The first step after a jump of
-!> the load or of the speed therefore assumes a = a' (uniform acceleration). The error of this one step is of
-!> second order.
+!> a does not follow a jump of the acceleration at once. The first step after a jump of the load or of the speed
+!> therefore assumes a = a' (uniform acceleration). The error of this one step is of second order.
 !>
 !> Energy: with the mean force f = m (v' - v)/dt of a step,
 !>

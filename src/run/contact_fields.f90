@@ -11,7 +11,7 @@ module contact_fields
 
 contains
 
-   !> Some rows of a field. The contact record has another type: see `contact_rows`.
+   !> Copy some rows of a field. The contact record has another type: see `contact_rows`.
    subroutine field_rows(self, name, first, values)
       class(contact_type), intent(in) :: self
       character(*), intent(in) :: name              !! as in /snapshots, except 'contact'
@@ -46,7 +46,7 @@ contains
       end select
    end subroutine field_rows
 
-   !> Some rows of the contact record: 0 open, 1 stick, 2 slip. Without friction all cells in contact slip; with
+   !> Copy some rows of the contact record: 0 open, 1 stick, 2 slip. Without friction all cells in contact slip; with
    !> friction they all stick until the road moves.
    subroutine contact_rows(self, first, states)
       class(contact_type), intent(in) :: self

@@ -4,7 +4,7 @@
 !> (module `row_state`). The stages of a step (`road_motion`, `coupled_passes`, `row_account`) work on it, and
 !> `asperity_simulation` calls them.
 !>
-!> Fields of doubles besides the state and the normal solver: H; with sliding also the original map and the
+!> Memory beside the state and the normal solver, in fields of doubles: H; with sliding also the original map and the
 !> two slopes; with Prony arms the traction of the past; with friction those of the modules
 !> `tangential_step` and `coupled_passes`.
 module contact_model

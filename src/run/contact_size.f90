@@ -36,8 +36,8 @@ module contact_size
 
 contains
 
-   !> Call this at the end of each phase. It keeps the best resolved patches so far, and warns at the end of the run
-   !> if not even these are wide enough. Earlier the contact may be small, because it grows from nothing.
+   !> Keep the best resolved patches at the end of each phase, and warn at the end of the run if not even these are wide
+   !> enough. A warning before would be too early, because a contact may be small while it grows.
    subroutine watch_contact_size(grid, patches, ends, widest, message)
       type(grid_type), intent(in) :: grid
       type(patch_size_type), intent(in) :: patches   !! of the contact now

@@ -33,8 +33,8 @@
 !> all cells slip takes one or two tangential iterations. Without this start it took eleven, because each cell that
 !> came into contact began as one that sticks.
 !>
-!> The error of a pass is the difference between the road at U_T and the road on which it was solved (`mismatch_of`
-!> below; the column `residual_coupling`).
+!> The error of a pass is the difference between the road at U_T and the road on which it was solved (module
+!> `coupling_mismatch`; the column `residual_coupling`).
 !>
 !> The loop of `solve` reads: do a pass at the place, and measure the mismatch that it leaves. If the mismatch is
 !> within the tolerance, and the solves of the pass were required to meet it as well, the row is solved. (The caller
@@ -51,14 +51,14 @@
 !> solve (`max_iterations`), and by the evaluations that `joint_equations` allows.
 !>
 !> Memory, in fields of doubles: the place, its residual, the best place and the displacement carried along have two
-!> components each, and so have the fields of the acceleration. With shares all of these but the displacement have a
+!> components each, and so have the fields of the acceleration. With shares all of these except the displacement have a
 !> third component, and there is a field of shares. `mismatch_of` borrows three fields from the contact's workspace.
 module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
    use contact_model, only : contact_mean, contact_type, solve_normal
+   use coupling_mismatch, only : mismatch_of
    use asperity_interpolation, only : displaced
-   use field_sums, only : row_totals
    use friction_law, only : contact_open
    use edge_shares, only : edge_rule_type, new_edge_rule
    use joint_step, only : joint_step_type
@@ -76,31 +76,28 @@ module coupled_passes
    integer, parameter :: most_passes = 400      !! if the case does not limit the number
 
    integer, parameter :: pairs = 6                      !! differences of passes that the acceleration remembers
-   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a difference; a larger one comes from round-off
+   real(dp), parameter :: largest_factor = 1.0e3_dp     !! of a difference in the acceleration; a larger one is round-off
 
    integer, parameter :: deciding_passes = 2            !! first passes of a row whose shares are 0 or 1
-   real(dp), parameter :: weight_of_share = 2.0_dp      !! in the norm of the acceleration, times the reach
+   real(dp), parameter :: weight_of_share = 2.0_dp      !! of the third component in the norm of the acceleration
 
    !> Accuracy of the pass that verifies a joint solution, as a multiple of the tolerance.
-   real(dp), parameter :: proof = 1.0e-3_dp
+   real(dp), parameter :: verifying = 1.0e-3_dp
 
    real(dp), parameter :: exact_load = 1.0e-12_dp       !! relative error of a load that counts as met exactly
-
-   !> Slopes in the contact count as at least this part of the rms slope of the map.
-   real(dp), parameter :: least_slope = 0.1_dp
 
    !> The work space of the passes and their outcome.
    type :: coupled_passes_type
       integer :: passes = 0                             !! done in the last row
       real(dp) :: mismatch = 0.0_dp                     !! of the last pass: the column residual_coupling
       logical, private :: gap_known = .false.           !! pressure, gap and heights are those of the last pass
-      !> z, m; with shares also share times reach, m [nx, 2 or 3, rows].
+      !> z, m; with shares also the share times its length (module `edge_shares`), m [nx, 2 or 3, rows].
       real(dp), allocatable, private :: place(:, :, :)
       real(dp), allocatable, private :: carried(:, :, :)    !! U_T of the row before, carried along, m [nx, 2, rows]
       real(dp), allocatable, private :: place_residual(:, :, :) !! of a pass: the place it leads to, minus its own, m
-      real(dp), allocatable, private :: best_place(:, :, :) !! that of the least mismatch, m
+      real(dp), allocatable, private :: best_place(:, :, :) !! the place of the least mismatch, m
       logical, private :: sharing = .false.             !! the shares of the cells are unknown, too
-      type(edge_rule_type), private :: edge             !! how they move, in the present row
+      type(edge_rule_type), private :: edge             !! the rule by which the shares change in the present row
       type(anderson_type), private :: mixing
       type(joint_step_type), private :: joint
    contains
@@ -137,7 +134,7 @@ contains
       type(pass_control_type) :: control
       real(dp) :: tolerance
       integer :: most
-      logical :: tried                                   !! the step was solved jointly, or this was tried
+      logical :: tried                                   !! the step was solved jointly, or the attempt failed
 
       tolerance = contact%case%solver%tolerance
       most = contact%case%solver%passes
@@ -186,22 +183,22 @@ contains
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: motion(2)                  !! of the road in this row, m
       type(pass_control_type), intent(out) :: control
-      logical :: breaks_motion                           !! this row does not continue the motion of the last one
+      logical :: continues                               !! this row continues the motion of the last one
 
       self%passes = 0
       self%gap_known = .false.
       call self%mixing%forget()
-      breaks_motion = plan%instantaneous .or. plan%new_speed
-      call predict(self, contact, plan%dt, motion, goes_on=.not. breaks_motion)
-      call control%start(contact%case%solver%tolerance, merge(1.0_dp, contact%state%first_mismatch, breaks_motion), &
+      continues = .not. (plan%instantaneous .or. plan%new_speed)
+      call predict(self, contact, plan%dt, motion, continues)
+      call control%start(contact%case%solver%tolerance, merge(contact%state%first_mismatch, 1.0_dp, continues), &
          self%sharing)
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
-      if (.not. breaks_motion) call contact%tangential%expect(contact%state%tangential, self%place)
+      if (continues) call contact%tangential%expect(contact%state%tangential, self%place)
    end subroutine begin
 
-   !> The passes have stalled: solve the step all at once. If that succeeds, the next pass starts from its solution
-   !> with accurate solves, and verifies that the step is solved. Otherwise the place stays as it is.
+   !> Solve the step all at once, because the passes have stalled. If that succeeds, the next pass starts from its
+   !> solution with accurate solves, and verifies that the step is solved. Otherwise the place stays as it is.
    subroutine solve_jointly(self, contact, plan, control, rubbing, tried)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
@@ -218,8 +215,8 @@ contains
       tried = transforms > 0
       if (.not. solved) return
       self%place(:, :2, :) = contact%tangential%trial
-      if (self%sharing) self%place(:, 3, :) = self%edge%reach*contact%tangential%share
-      control%accuracy = proof*contact%case%solver%tolerance
+      if (self%sharing) self%place(:, 3, :) = self%edge%share_length*contact%tangential%share
+      control%accuracy = verifying*contact%case%solver%tolerance
    end subroutine solve_jointly
 
    !> Do one pass at the place, and compute the mismatch that it leaves.
@@ -255,7 +252,7 @@ contains
          contact%slope_x, contact%slope_y, part)
       call add_result(rubbing, part)
       if (rubbing%stopped) return
-      self%mismatch = mismatch_of(self, contact, plan)
+      self%mismatch = mismatch_of(contact, plan, self%sharing, self%edge)
    end subroutine do_pass
 
    !> Compute the shares for the tangential solve of a pass from the result of its normal solve, and their residual.
@@ -265,24 +262,24 @@ contains
 
       if (.not. allocated(contact%tangential%share)) &
          allocate (contact%tangential%share(size(self%place, 1), size(self%place, 3)))
-      contact%tangential%share(:, :) = self%place(:, 3, :)/self%edge%reach
+      contact%tangential%share(:, :) = self%place(:, 3, :)/self%edge%share_length
       if (self%passes <= deciding_passes) then
          call self%edge%decide(contact%state%pressure, contact%state%gap, contact%tangential%share)
       else
          call self%edge%move(contact%state%pressure, contact%state%gap, contact%tangential%share)
       end if
-      self%place_residual(:, 3, :) = self%edge%reach*contact%tangential%share - self%place(:, 3, :)
+      self%place_residual(:, 3, :) = self%edge%share_length*contact%tangential%share - self%place(:, 3, :)
    end subroutine take_shares
 
    !> Compute the first place of a row: the displacement of the row before, moved along with the contact, which
    !> follows the road over the rubber, plus the mean motion of the rubber's surface, plus the forecast of module
    !> `place_forecast`.
-   subroutine predict(self, contact, dt, motion, goes_on)
+   subroutine predict(self, contact, dt, motion, continues)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       real(dp), intent(in) :: dt                         !! s
       real(dp), intent(in) :: motion(2)                  !! of the road, m
-      logical, intent(in) :: goes_on                     !! the row continues the motion of the last one
+      logical, intent(in) :: continues                   !! the row continues the motion of the last one
       integer :: c
 
       do c = 1, 2
@@ -292,13 +289,13 @@ contains
       end do
       self%place(:, :2, :) = self%carried
       associate (forecast => contact%state%tangential%forecast)
-         call forecast%follow(contact%grid, dt, goes_on, contact%drift - motion)
+         call forecast%follow(contact%grid, dt, continues, contact%drift - motion)
          call forecast%add(self%place(:, :2, :))
       end associate
       if (.not. self%sharing) return
       self%edge = new_edge_rule(contact%side%potential, contact%tangential%cell_compliance(), &
          contact%tangential%law%bare_strength(), contact%rms_slope)
-      self%place(:, 3, :) = merge(self%edge%reach, 0.0_dp, contact%state%tangential%contact /= contact_open)
+      self%place(:, 3, :) = merge(self%edge%share_length, 0.0_dp, contact%state%tangential%contact /= contact_open)
    end subroutine predict
 
    !> Compute the next place from the result of the last pass.
@@ -335,56 +332,8 @@ contains
          call self%mixing%step([1.0_dp, 1.0_dp, weight_of_share], self%place_residual, self%place, plain=.false., &
             damping=control%damping)
       end if
-      if (self%sharing) self%place(:, 3, :) = min(max(self%place(:, 3, :), 0.0_dp), self%edge%reach)
+      if (self%sharing) self%place(:, 3, :) = min(max(self%place(:, 3, :), 0.0_dp), self%edge%share_length)
    end subroutine choose_place
-
-   !> The difference between the road at U_T and the road on which the pass was solved. It is the larger of two
-   !> means that are weighted by the pressure: the difference of the heights divided by the rms height of the map,
-   !> and that of the slopes divided by the slopes in the contact. With constant shear a cell with hardly any pressure
-   !> carries as much traction as any other, and these means do not show whether it obeys the law. In that case the
-   !> sum of the errors of all cells (module `edge_shares`) counts as well.
-   function mismatch_of(self, contact, plan) result(mismatch)
-      class(coupled_passes_type), intent(in) :: self
-      class(contact_type), intent(inout) :: contact
-      type(planned_row_type), intent(in) :: plan
-      real(dp) :: mismatch
-      real(dp), pointer, contiguous :: height(:, :), slope_x(:, :), slope_y(:, :)     ! of the road at U_T
-      real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(4), edges
-      integer :: j
-
-      call contact%work%lend('height at U_T', height)
-      call contact%work%lend('slope along x at U_T', slope_x)
-      call contact%work%lend('slope along y at U_T', slope_y)
-      call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
-         contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
-      allocate (rows(4, contact%grid%rows()))
-      !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
-      do j = 1, contact%grid%rows()
-         rows(1, j) = sum(abs(contact%state%pressure(:, j)))
-         rows(2, j) = sum(abs(contact%state%pressure(:, j)*(height(:, j) - contact%height(:, j))))
-         rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(slope_x(:, j) - contact%slope_x(:, j), &
-            slope_y(:, j) - contact%slope_y(:, j)))
-         rows(4, j) = sum(abs(contact%state%pressure(:, j))*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
-      end do
-      sums = row_totals(rows)
-      edges = 0.0_dp
-      if (self%sharing) then
-         ! From here on `height` holds the gap over the road at U_T.
-         !$omp parallel do default(none) shared(contact, height) private(j)
-         do j = 1, contact%grid%rows()
-            height(:, j) = contact%state%gap(:, j) + contact%height(:, j) - height(:, j)
-         end do
-         edges = self%edge%error(contact%tangential%share, contact%state%pressure, height)
-      end if
-      call contact%work%take_back(height)
-      call contact%work%take_back(slope_x)
-      call contact%work%take_back(slope_y)
-      mismatch = edges
-      if (.not. sums(1) > 0.0_dp) return
-      mismatch = max(mismatch, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
-         sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))
-   end function mismatch_of
 
    !> Add the record of a solve to that of the row: keep the last outcome, and add up the work.
    subroutine add_result(total, part)

@@ -6,10 +6,10 @@
 !> strength. A pass solves for the pressure and for the traction one after the other, so that neither of the two
 !> solves can find the share. It is therefore an unknown of the passes, and each pass changes it:
 !>
-!>     share <- share + (soft P_w - gap)/reach        cut off at 0 and 1
+!>     share <- share + (soft P_w - gap)/share_length        limited to the range from 0 to 1
 !>
-!> P_w is the pressure of the wall, soft P_w the length by which it presses a cell in, and the reach the
-!> length by which a full share moves the cell down the slope of the road. The share remains constant only if
+!> P_w is the pressure without the attraction, and soft P_w the length by which it presses a cell in. `share_length` is
+!> the length by which the whole strength moves the cell down the slope of the road. The share remains constant only if
 !> the cell is in one of the three states. If the share decides whether the cell touches, the rule is nearly
 !> Newton's method for that cell alone. All cells at the edge change at once.
 module edge_shares
@@ -21,13 +21,13 @@ module edge_shares
 
    public :: edge_rule_type, new_edge_rule
 
-   real(dp), parameter :: least_slope = 0.05_dp        !! of a road in the reach
+   real(dp), parameter :: least_slope = 0.05_dp        !! of a road in `share_length`
 
    !> The parameters of the rule in a step.
    type :: edge_rule_type
       type(adhesion_potential_type) :: potential
       real(dp) :: soft = 0.0_dp                        !! displacement of a cell under its own unit traction, m/Pa
-      real(dp) :: reach = 0.0_dp                       !! by which the whole strength moves a cell down the slopes, m
+      real(dp) :: share_length = 0.0_dp                !! by which the whole strength moves a cell down the slopes, m
    contains
       procedure :: decide
       procedure :: move
@@ -46,10 +46,10 @@ contains
 
       rule%potential = potential
       rule%soft = soft
-      rule%reach = max(soft*strength*max(rms_slope, least_slope), tiny(1.0_dp))
+      rule%share_length = max(soft*strength*max(rms_slope, least_slope), tiny(1.0_dp))
    end function new_edge_rule
 
-   !> Pressure of the wall in a cell, Pa: without the attraction.
+   !> P_w, the pressure in a cell without the attraction, Pa.
    elemental function wall_pressure(self, pressure, gap) result(wall)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: pressure                 !! attraction included, Pa
@@ -87,15 +87,15 @@ contains
       !$omp parallel do default(none) shared(self, pressure, gap, share) private(j)
       do j = 1, size(share, 2)
          share(:, j) = share(:, j) &
-            + (self%soft*wall_pressure(self, pressure(:, j), gap(:, j)) - gap(:, j))/self%reach
+            + (self%soft*wall_pressure(self, pressure(:, j), gap(:, j)) - gap(:, j))/self%share_length
          share(:, j) = min(max(share(:, j), 0.0_dp), 1.0_dp)
       end do
    end subroutine move
 
    !> The sum of the errors of all cells, over the sum of the lengths by which their pressures press them in. A cell
-   !> without traction must have neither a pressure of the wall nor an overlap with the road, a cell with traction no
-   !> gap, and a cell with a part of the traction no pressure of the wall. The result is 0 if there is no such
-   !> length, that is, without any pressure and on a grid of one cell. Collective if processes share the rows.
+   !> without a share must have neither P_w nor an overlap with the road, a cell with a share must have no gap, and a
+   !> cell with a share below 1 must have no P_w. The result is 0 if there is no such length, that is, without any
+   !> pressure and on a grid of one cell. Collective if processes share the rows.
    function error(self, share, pressure, gap)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: share(:, :)

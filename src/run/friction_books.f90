@@ -58,8 +58,8 @@ contains
       rubbed = rubbed_type(total(1), total(2:3), total(4))
    end subroutine book_friction
 
-   !> The loss of a cell by friction in a step, J/m2: the mean of the frictional tractions at both ends times the
-   !> slip. A cell that enters or leaves the contact has no traction at one end. A cell that stuck at the start slips
+   !> The loss of a cell by friction in a step, J/m2: the mean of the frictional tractions at both ends of the step times
+   !> the slip. A cell that enters or leaves the contact has no traction at one end. A cell that stuck at the start slips
    !> only after its traction has reached the bound, so that only the traction at the end counts. The same holds if
    !> the slip is opposed to the traction of the start, because the cell must have stuck in between.
    pure function rubbed_off(stuck, before, after, slip) result(loss)

@@ -1,9 +1,11 @@
 !> The equations of a step with friction for all cells at once (module `joint_system`).
 !>
-!> With the road H read at the displacement that T makes, the equations are
+!> With the road H read at the displacement that T causes, the equations are
 !>
 !>     U_z - H - level = gap            of every cell, U_z = A_z (P + P_h)/Q
-!>     T = bound(T + r/a)               r the slip, a the tangential compliance of a cell; 0 where open
+!>     T = bound(T + r/a)               of every cell that is not open: r is the slip, a the tangential compliance of a
+!>                                      cell, and bound(w) = w within the bound, otherwise w returned to it; T = 0 in
+!>                                      open cells
 !>     mean of P = load                 or the level is given
 !>
 !> An evaluation takes six transforms.
@@ -32,7 +34,7 @@ module joint_equations
    !> The equations and their work space. A variable of this type must not be copied.
    type, extends(joint_system_type) :: joint_equations_type
       logical :: ready = .false.
-      class(contact_type), pointer, private :: contact => null()   !! of the step at hand
+      class(contact_type), pointer, private :: contact => null()   !! of the step that is being solved
       type(planned_row_type), private :: plan
       real(dp), private :: compliance = 0.0_dp         !! of a cell under its own unit pressure, G = 1, m/Pa
       type(convolution_type), private :: operator      !! A_z, G = 1
@@ -41,7 +43,7 @@ module joint_equations
       procedure :: prepare
       procedure :: start
       procedure :: evaluate
-      procedure :: hand_out
+      procedure :: return_solution
       procedure :: destroy
    end type joint_equations_type
 
@@ -110,7 +112,7 @@ contains
       call evaluate_step(self, self%contact, self%plan, state)
    end subroutine evaluate
 
-   !> The same with the contact and the row at hand.
+   !> Do the same with the contact and the row as arguments.
    subroutine evaluate_step(self, contact, plan, state)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
@@ -130,18 +132,18 @@ contains
       !$omp num_threads(self%operator%threads)
       do j = 1, contact%grid%rows()
          call evaluate_row(self, contact, state, j)
-         rows(:, j) = [sum(state%left(:, :, j)**2), sum(self%pressure(:, j))]
-         largest(j) = maxval(abs(state%left(:, :, j)))
+         rows(:, j) = [sum(state%residual(:, :, j)**2), sum(self%pressure(:, j))]
+         largest(j) = maxval(abs(state%residual(:, :, j)))
       end do
       sums = row_totals(rows)
       if (plan%control == 'displacement') then
-         state%left_load = (state%level - (plan%load - contact%summit))/self%unit_length
+         state%load_residual = (state%level - (plan%load - contact%summit))/self%unit_length
       else
-         state%left_load = (sums(2)/contact%grid%cells() - wanted_mean(contact, plan))/self%unit_pressure
+         state%load_residual = (sums(2)/contact%grid%cells() - wanted_mean(contact, plan))/self%unit_pressure
       end if
-      state%worst = max(largest_of_rows(largest), abs(state%left_load))
-      state%left_load = state%left_load*self%root
-      state%merit = sqrt(sums(1) + state%left_load**2)
+      state%worst = max(largest_of_rows(largest), abs(state%load_residual))
+      state%load_residual = state%load_residual*self%root
+      state%merit = sqrt(sums(1) + state%load_residual**2)
    end subroutine evaluate_step
 
    !> The mean pressure that is prescribed, Pa.
@@ -154,7 +156,7 @@ contains
       if (plan%control == 'force') mean = plan%load/contact%grid%area()
    end function wanted_mean
 
-   !> P of a state, and the transforms of its displacement.
+   !> Compute P of a state, and the transforms of its displacement.
    subroutine form_pressure(self, contact, s)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(in) :: contact
@@ -183,19 +185,19 @@ contains
       integer :: i
 
       call self%operator%backward_row(1, j, u)
-      state%left(:, 1, j) = (u/contact%material%q - self%height(:, j) - state%level &
+      state%residual(:, 1, j) = (u/contact%material%q - self%height(:, j) - state%level &
          - self%rules%gap_of(state%s(:, j)))/self%unit_length
       share = self%rules%share_of(self%width(:, j), state%s(:, j))
       slope = 0.0_dp
       do i = 1, size(u)
          if (self%rules%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
-         state%left(i, 2:3, j) = self%rules%lacking(share(i), self%pressure(i, j), slope, &
+         state%residual(i, 2:3, j) = self%rules%traction_error(share(i), self%pressure(i, j), slope, &
             contact%tangential%slip(i, :, j), state%t(i, :, j))/self%unit_traction
       end do
    end subroutine evaluate_row
 
    !> Copy the solution to the contact, if there is memory for the shares of the cells.
-   subroutine hand_out(self, contact, found, done)
+   subroutine return_solution(self, contact, found, done)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(joint_state_type), intent(inout) :: found
@@ -228,7 +230,7 @@ contains
             end do
          end do
       end associate
-   end subroutine hand_out
+   end subroutine return_solution
 
    !> Free the operator.
    subroutine destroy(self)

@@ -47,7 +47,7 @@ contains
       end if
       call self%equations%start(contact, plan, self%newton%now)
       call self%newton%solve(self%equations, contact%case%solver%tolerance, solved)
-      if (solved) call self%equations%hand_out(contact, self%newton%now, solved)
+      if (solved) call self%equations%return_solution(contact, self%newton%now, solved)
       transforms = 6*self%equations%evaluations
    end subroutine solve
 

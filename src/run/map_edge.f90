@@ -18,8 +18,7 @@ module map_edge
    public :: look_at_edge
 
    real(dp), parameter :: well_below = 0.1_dp     !! least gap of a moving edge over depth or rms height
-   real(dp), parameter :: out_of_reach = 5.0_dp   !! least gap of a moving edge over the range of adhesion
-
+   real(dp), parameter :: beyond_range = 5.0_dp   !! least gap of a moving edge over the range of adhesion
 
 contains
 
@@ -31,7 +30,7 @@ contains
       real(dp), intent(in) :: move(2)                !! of the road in the step, m
       type(state_type), intent(inout) :: state       !! `edge` is the worst finding so far; only a worse one is reported
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
-      real(dp) :: depth, least, near, reach
+      real(dp) :: depth, least, near, range_of_edge
       logical :: adhesive
       integer :: touching, wx, wy
 
@@ -45,10 +44,10 @@ contains
          call add_line(message, to_text(touching)//' cells at the edge of the free map touch; contact beyond '// &
             'the map is left out: use a larger map')
       else if (any(abs(move) > 0.0_dp) .and. state%edge < edge_near) then
-         reach = out_of_reach*range
-         if (least >= max(well_below*rms_height, reach)) return
+         range_of_edge = beyond_range*range
+         if (least >= max(well_below*rms_height, range_of_edge)) return
          depth = depth_of_contact(state%pressure, state%displacement)
-         near = max(well_below*min(depth, rms_height), reach)
+         near = max(well_below*min(depth, rms_height), range_of_edge)
          if (least >= near) return
          state%edge = edge_near
          call add_line(message, 'points enter or leave the free map only '//to_text(least)// &

@@ -32,7 +32,7 @@ module normal_step
       real(dp) :: load = 0.0_dp                    !! Pa, N or m
       real(dp) :: modulus = 0.0_dp                 !! Q, Pa
       logical :: first = .false.                   !! there is no state yet
-      !> Without adhesion: the gap handed in is the displacement U of the pressure handed in, m.
+      !> Without adhesion: the given gap holds the displacement U under the given pressure, m.
       logical :: displaced = .false.
    end type normal_task_type
 
@@ -44,7 +44,7 @@ module normal_step
       real(dp) :: rms_height = 0.0_dp              !! of the original map about its mean, m
       class(contact_solver_type), allocatable :: normal
       type(adhesion_potential_type) :: potential
-      type(adhesion_solver_type), private :: sticky
+      type(adhesion_solver_type), private :: adhesion
       logical, private :: full_contact = .false.
       real(dp) :: tolerance = 1e-6_dp              !! of the next solve
       integer, private :: max_iterations = 1000
@@ -60,7 +60,7 @@ contains
    subroutine new_normal_step(self, grid, kernel, solver, adhesion, edge, height, error)
       type(normal_step_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel           !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel           !! normal response of the solid
       type(solver_settings_type), intent(in) :: solver
       type(adhesion_settings_type), intent(in) :: adhesion
       real(dp), intent(in) :: edge                      !! width of a rounded jump of the attraction, m
@@ -86,7 +86,7 @@ contains
       call new_adhesion_potential(self%potential, trim(adhesion%potential), adhesion%energy, &
          adhesion%range, error, edge=edge)
       if (allocated(error)) return
-      call new_adhesion_solver(self%sticky, self%grid, kernel, error, trim(solver%method))
+      call new_adhesion_solver(self%adhesion, self%grid, kernel, error, trim(solver%method))
    end subroutine new_normal_step
 
    !> Solve under the load of the row, starting from the given pressure and gap.
@@ -104,7 +104,7 @@ contains
       integer :: j
 
       if (.not. self%adhesive) then
-         call solve_bare(self, task, height, pressure, gap, level, outcome, past)
+         call solve_without_adhesion(self, task, height, pressure, gap, level, outcome, past)
          return
       end if
       if (task%first .and. self%full_contact) then
@@ -125,7 +125,7 @@ contains
       problem%max_iterations = self%max_iterations
       problem%full_contact = task%first .and. self%full_contact
       call load_of(self, task, problem%control, problem%target)
-      call self%sticky%solve(problem, height, gap, pressure, level, outcome, past)
+      call self%adhesion%solve(problem, height, gap, pressure, level, outcome, past)
       outcome%iterations = outcome%iterations + before%iterations
       outcome%ffts = outcome%ffts + before%ffts
    end subroutine solve
@@ -167,7 +167,7 @@ contains
          touch%load = 0.0_dp
       end if
       if (presses .or. present(past)) then
-         call solve_bare(self, touch, height, pressure, gap, level, outcome, past)
+         call solve_without_adhesion(self, touch, height, pressure, gap, level, outcome, past)
          if (outcome%stopped) return
       else
          level = -self%summit
@@ -183,7 +183,7 @@ contains
    end subroutine start
 
    !> Solve the contact without adhesion, but only roughly if the contact with adhesion follows.
-   subroutine solve_bare(self, task, height, pressure, gap, level, outcome, past)
+   subroutine solve_without_adhesion(self, task, height, pressure, gap, level, outcome, past)
       type(normal_step_type), intent(inout) :: self
       type(normal_task_type), intent(in) :: task
       real(dp), contiguous, intent(in) :: height(:, :)
@@ -202,7 +202,7 @@ contains
       problem%displaced = task%displaced
       call load_of(self, task, problem%control, problem%target)
       call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
-   end subroutine solve_bare
+   end subroutine solve_without_adhesion
 
    !> Energy of adhesion of a gap over the whole cell, J.
    function energy(self, gap) result(total)
@@ -227,7 +227,7 @@ contains
       class(normal_step_type), intent(inout) :: self
 
       if (allocated(self%normal)) call self%normal%destroy()
-      if (self%adhesive) call self%sticky%destroy()
+      if (self%adhesive) call self%adhesion%destroy()
    end subroutine destroy
 
 end module normal_step

@@ -6,7 +6,7 @@
 !>
 !> * The solves return without an iteration, because their start is already within the required accuracy. The
 !>   mismatch then says little, above all if a thick block turns a small error of the friction into a large
-!>   displacement. Therefore, if `patience` successive passes have not reduced the mismatch to `falls` times
+!>   displacement. Therefore, if `patience` successive passes have not reduced the mismatch to `success` times
 !>   the least one before, the fraction is reduced tenfold, and the required accuracy may become better than the
 !>   tolerance.
 !> * An extrapolation diverges. If the mismatch is ten times the least one so far, the acceleration discards its
@@ -17,10 +17,9 @@
 !>   fold: the contact will snap to another state). The residual then keeps its direction and hardly changes from
 !>   pass to pass, while each step leads a little further to the other state. The passes return to the best place
 !>   and continue without acceleration (`plain`), with a momentum that grows as long as the residual keeps its
-!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth of its value
-!>   at the first plain step, or after `stalled_plain` passes
-!>   without halving it, the acceleration begins again from the present place. The best place before is discarded,
-!>   because it belongs to the state that ceased to exist.
+!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth (`recovered`) of its value at the
+!>   first plain step, or has not been halved in `stalled_plain` passes, the acceleration begins again from the present
+!>   place. The best place before is discarded, because it may belong to the state that ceased to exist.
 !>
 !> If the passes stall even with plain steps, they may never settle. The step should then be solved all at once
 !> (`joint_due`), but at most once per row, because an attempt may cost as much as many passes.
@@ -35,18 +34,26 @@ module pass_control
    real(dp), parameter :: finest = 1.0e-4_dp        !! best accuracy of a solve, as a multiple of the tolerance
    real(dp), parameter :: round_off = 1.0e-11_dp    !! accuracy that double precision can reach
    real(dp), parameter :: nearly = 3.0_dp           !! an accuracy within this factor of the tolerance nearly meets it
-   real(dp), parameter :: usual_fraction = 0.1_dp, least_fraction = 1.0e-6_dp
-   real(dp), parameter :: falls = 0.3_dp            !! a mismatch below this part of the least one is a success
+   real(dp), parameter :: usual_fraction = 0.1_dp   !! accuracy of a pass over the last mismatch
+   real(dp), parameter :: least_fraction = 1.0e-6_dp   !! the same, after many reductions
+   real(dp), parameter :: success = 0.3_dp          !! a mismatch below this part of the least one is a success
    real(dp), parameter :: slow = 0.5_dp             !! a mismatch above this part of the last is slow progress
-   real(dp), parameter :: slow_damping = 0.5_dp, sharing_damping = 0.8_dp
-   real(dp), parameter :: astray = 10.0_dp
-   real(dp), parameter :: first_plain = 0.3_dp, shortest = 0.05_dp, longest = 0.5_dp  !! plain steps
-   real(dp), parameter :: grows = 1.2_dp, shrinks = 0.5_dp, gathers = 0.7_dp          !! factors by which they change
+   real(dp), parameter :: slow_damping = 0.5_dp     !! damping after slow progress
+   real(dp), parameter :: sharing_damping = 0.8_dp  !! the same if the shares are unknown
+   real(dp), parameter :: diverged = 10.0_dp        !! a mismatch above this multiple of the least one has diverged
+   integer, parameter :: patience = 2               !! passes without success before the fraction is reduced
+   integer, parameter :: stalled = 15               !! accelerated passes that must halve the mismatch
+
+   ! Plain steps. If the residual keeps its direction, their length and momentum grow; if it turns, both shrink.
+   integer, parameter :: stalled_plain = 60         !! plain passes that must halve the mismatch
+   real(dp), parameter :: recovered = 0.1_dp        !! plain steps end at this part of their first mismatch
+   real(dp), parameter :: first_length = 0.3_dp, shortest = 0.05_dp, longest = 0.5_dp
+   real(dp), parameter :: growth = 1.2_dp           !! factor of the length if the residual keeps its direction
+   real(dp), parameter :: shrinkage = 0.5_dp        !! factor of the length if the residual turns
+   real(dp), parameter :: momentum_growth = 0.7_dp  !! factor of 1 - momentum if the residual keeps its direction
    real(dp), parameter :: most_momentum = 0.95_dp
-   real(dp), parameter :: straight = 0.8_dp, bent = 0.2_dp  !! cosine of the angle between two residuals
-   real(dp), parameter :: gained = 0.1_dp           !! plain steps end at this part of their first mismatch
-   integer, parameter :: patience = 2
-   integer, parameter :: stalled = 15, stalled_plain = 60
+   real(dp), parameter :: straight = 0.8_dp         !! cosine between two residuals above which it keeps its direction
+   real(dp), parameter :: bent = 0.2_dp             !! cosine between two residuals below which it turns
 
    !> The observations of the passes of a step, and the decisions for the next one.
    type :: pass_control_type
@@ -61,15 +68,15 @@ module pass_control
       real(dp), private :: tolerance = 0.0_dp
       real(dp), private :: fraction = usual_fraction
       logical, private :: may_be_joint = .true.     !! the row may still be solved all at once
-      real(dp), private :: slowed = slow_damping    !! damping where the mismatch falls slowly
+      real(dp), private :: slowed = slow_damping    !! damping after slow progress
       real(dp), private :: length = 1.0_dp          !! of plain steps
-      real(dp), private :: plain_start = 0.0_dp     !! mismatch where the plain steps began
-      real(dp), private :: least = huge(1.0_dp)     !! mismatch so far
-      real(dp), private :: last = huge(1.0_dp)      !! mismatch
+      real(dp), private :: plain_start = 0.0_dp     !! least mismatch when the plain steps began
+      real(dp), private :: least = huge(1.0_dp)     !! least mismatch so far
+      real(dp), private :: last = huge(1.0_dp)      !! mismatch of the last pass
       real(dp), private :: milestone = huge(1.0_dp) !! mismatch that must be halved
-      integer, private :: since = 0                 !! passes since the milestone
-      integer, private :: seen = 0
-      integer, private :: idle = 0                  !! passes whose mismatch did not fall
+      integer, private :: since = 0                 !! passes since the milestone, or since the plain steps began
+      integer, private :: seen = 0                  !! passes judged since the start, or since the plain steps ended
+      integer, private :: idle = 0                  !! successive passes without success
    contains
       procedure :: start
       procedure :: judge
@@ -90,7 +97,7 @@ contains
       if (sharing) self%slowed = sharing_damping
       self%tolerance = tolerance
       self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_fraction*expected))
-      call spare_a_pass(self)
+      call round_to_tolerance(self)
    end subroutine start
 
    !> Judge a pass, and decide how the next one is done.
@@ -104,7 +111,7 @@ contains
       self%last = mismatch
 
       self%idle = self%idle + 1
-      if (self%seen == 1 .or. mismatch <= falls*self%least) self%idle = 0
+      if (self%seen == 1 .or. mismatch <= success*self%least) self%idle = 0
       if (self%idle == patience) then
          self%fraction = max(0.1_dp*self%fraction, least_fraction)
          self%idle = 0
@@ -112,9 +119,9 @@ contains
       self%accuracy = max(finest*self%tolerance, round_off, self%fraction*mismatch)
       if (self%fraction >= usual_fraction) self%accuracy = max(self%accuracy, self%tolerance)
       self%accuracy = min(self%accuracy, max(coarsest, self%tolerance))
-      call spare_a_pass(self)
+      call round_to_tolerance(self)
 
-      self%forget = mismatch > astray*self%least .and. .not. self%plain
+      self%forget = mismatch > diverged*self%least .and. .not. self%plain
       self%go_back = .false.
       self%joint_due = .false.
       self%best_yet = mismatch < self%least
@@ -127,36 +134,37 @@ contains
       if (self%plain) then
          self%joint_due = self%since >= stalled_plain .and. self%may_be_joint
          if (self%joint_due) self%may_be_joint = .false.
-         if (self%since >= stalled_plain .or. mismatch < gained*self%plain_start) call accelerate(self, mismatch)
+         if (self%since >= stalled_plain .or. mismatch < recovered*self%plain_start) &
+            call end_plain_steps(self, mismatch)
       else if (self%since >= stalled) then
-         call go_plain(self)
+         call begin_plain_steps(self)
       end if
    end subroutine judge
 
-   !> If the next pass would be solved nearly to the tolerance, require the tolerance itself, because it may then be
-   !> the last pass.
-   pure subroutine spare_a_pass(self)
+   !> Require the tolerance itself if the next pass would be solved nearly to it. This may save a pass, because the next
+   !> one may then be the last.
+   pure subroutine round_to_tolerance(self)
       class(pass_control_type), intent(inout) :: self
 
       if (self%accuracy <= nearly*self%tolerance) self%accuracy = min(self%accuracy, self%tolerance)
-   end subroutine spare_a_pass
+   end subroutine round_to_tolerance
 
    !> Return to the best place, and continue in plain steps.
-   pure subroutine go_plain(self)
+   pure subroutine begin_plain_steps(self)
       class(pass_control_type), intent(inout) :: self
 
       self%plain = .true.
       self%go_back = .true.
       self%forget = .true.
       self%since = 0
-      self%length = first_plain
+      self%length = first_length
       self%damping = self%length
       self%momentum = 0.0_dp
       self%plain_start = self%least
-   end subroutine go_plain
+   end subroutine begin_plain_steps
 
-   !> End the plain steps: the acceleration begins again from here.
-   pure subroutine accelerate(self, mismatch)
+   !> End the plain steps. The acceleration begins again from the present place, which counts as the best one.
+   pure subroutine end_plain_steps(self, mismatch)
       class(pass_control_type), intent(inout) :: self
       real(dp), intent(in) :: mismatch
 
@@ -167,7 +175,7 @@ contains
       self%milestone = mismatch
       self%since = 0
       self%seen = 0
-   end subroutine accelerate
+   end subroutine end_plain_steps
 
    !> Prepare a plain step: its length and the momentum grow while the residual keeps its direction, and become
    !> smaller if it turns.
@@ -176,11 +184,11 @@ contains
       real(dp), intent(in) :: cosine                !! of the angle between the last two residuals
 
       if (cosine > straight) then
-         self%momentum = min(1.0_dp - gathers*(1.0_dp - self%momentum), most_momentum)
-         self%length = min(grows*self%length, longest)
+         self%momentum = min(1.0_dp - momentum_growth*(1.0_dp - self%momentum), most_momentum)
+         self%length = min(growth*self%length, longest)
       else if (cosine < bent) then
          self%momentum = 0.0_dp
-         self%length = max(shrinks*self%length, shortest)
+         self%length = max(shrinkage*self%length, shortest)
       end if
       self%damping = self%length
    end subroutine follow

@@ -4,8 +4,8 @@
 !> slowly while it does so. Let B_n be the displacement of the row before, carried along to the position of the
 !> road in row n. Then
 !>
-!>     a_n = U_n - B_n                   what the row has changed
-!>     b_n = a_n - (a_(n-1), carried)    by how much more than the row before
+!>     a_n = U_n - B_n                   the change in the row
+!>     b_n = a_n - (a_(n-1), carried)    the increase of the change over that of the row before
 !>     c_n = b_n - (b_(n-1), carried)
 !>
 !> are the errors of three forecasts of U_n: B_n, B_n + a_(n-1), and B_n + a_(n-1) + b_(n-1), which are
@@ -17,7 +17,8 @@
 !> The differences are only valid for settled steps of the same length and speed. If these change, or if a row has
 !> not settled, the differences are discarded, because the error of such a row would be mistaken for a motion.
 !>
-!> Plain data, part of the state of a run. Fields of doubles: two components each of a and b.
+!> The forecast is plain data and part of the state of a run. Memory, in fields of doubles: two components each of a
+!> and b.
 module place_forecast
    use asperity_precision, only : dp
    use carried_field, only : carry
@@ -57,16 +58,16 @@ contains
    end subroutine new_place_forecast
 
    !> Begin a row: the contact moves along the rubber by -motion.
-   subroutine follow(self, grid, dt, goes_on, motion)
+   subroutine follow(self, grid, dt, continues, motion)
       class(place_forecast_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: dt                     !! s
-      logical, intent(in) :: goes_on                 !! the row continues the motion of the last one
+      logical, intent(in) :: continues               !! the row continues the motion of the last one
       real(dp), intent(in) :: motion(2)              !! of the rubber over the road, m
       real(dp), allocatable :: moved(:, :)
       integer :: c
 
-      if (.not. goes_on .or. abs(dt - self%dt) > same_length*dt) call self%forget()
+      if (.not. continues .or. abs(dt - self%dt) > same_length*dt) call self%forget()
       self%dt = dt
       allocate (moved(size(self%change, 1), size(self%change, 3)))
       do c = 1, 2

@@ -16,7 +16,7 @@ module pulled_road
 
 contains
 
-   !> The direction in which a row drives the road: that of its velocity, or that of the pull if the road is only
+   !> Set the direction in which a row drives the road: that of its velocity, or that of the pull if the road is only
    !> pulled. Without either the direction does not change.
    pure subroutine drive_direction(plan, direction)
       type(planned_row_type), intent(in) :: plan
@@ -61,8 +61,8 @@ contains
       end where
    end subroutine take_road
 
-   !> Warn once if a pull moves the road so far in a step that the contact is not resolved in time. For a road that
-   !> is driven, module `case_phases` checks this before the run.
+   !> Warn, once in a run, if a pull moves the road so far in a step that the contact is not resolved in time. For a road
+   !> that is driven, module `case_phases` checks this before the run.
    subroutine watch_way(plan, grid, road, reported, message)
       type(planned_row_type), intent(in) :: plan
       type(grid_type), intent(in) :: grid

@@ -43,7 +43,7 @@ contains
       call file%close(ignored)
    end subroutine summarise_result
 
-   !> Name the damaged parts of a result.
+   !> Add the names of the damaged parts of a result.
    subroutine add_damage(file, path, text, error)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
@@ -72,7 +72,7 @@ contains
       call fail(error, error_file, path//': the file is damaged: '//part)
    end subroutine add_damage
 
-   !> The summary of a height map, as `asperity import` and `asperity.surface.save` write it.
+   !> Summarise a height map that `asperity import` or `asperity.surface.save` has written.
    subroutine describe_map(file, path, text, error)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
@@ -127,7 +127,7 @@ contains
       if (words /= '') line = head//ordinary(words, most)//nl
    end function attribute_line
 
-   !> The summary of an open file.
+   !> Summarise an open result.
    subroutine describe(file, path, text, error)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
@@ -232,7 +232,7 @@ contains
       end do
    end function phases_text
 
-   !> The last row of the history, and how well it converged.
+   !> Add the last row of the history, and the largest residuals of all rows.
    subroutine history_text(file, text, error)
       type(hdf5_file_type), intent(inout) :: file
       character(:), allocatable, intent(inout) :: text

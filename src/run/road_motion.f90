@@ -1,7 +1,7 @@
 !> The motion of the road under the rubber at the start of a row.
 !>
 !> The fields that belong to places of the road (pressure, tractions, contact record) are shifted with it by
-!> whole cells, because they are then the best start for the solvers. The surface of the rubber is expected to
+!> whole cells, because this makes them a good start for the solvers. The surface of the rubber is expected to
 !> continue the motion of the step before.
 module road_motion
    use contact_model, only : contact_type, place_road

@@ -10,8 +10,8 @@
 !>    U' = h (F + T_h)/Q,   T - F = f' = R (U' - (D' - D))/h - k
 !>
 !> with the height h of the block, the traction T_h of the past, the force f' on the mass, its resistance R and
-!> the part k of this force that is known before the step (module `block_motion`). Hence
-!> Q (D' - D) - Q U' = -Q h/R (k + T - F): for the solver this is a spring, and its operator needs no mean
+!> the part k of this force that is known before the step (module `block_motion`). This gives
+!> Q (D' - D) - Q U' = -Q h/R (k + T - F). For the solver this is a spring, and its operator needs no mean
 !> mode. In an instantaneous step the mass does not move.
 module road_pull
    use asperity_precision, only : dp
@@ -30,11 +30,11 @@ module road_pull
       real(dp), private :: force(2) = 0.0_dp          !! F, Pa
       real(dp), private :: q = 0.0_dp                 !! Q of the step
       real(dp), private :: mass_offset(2) = 0.0_dp    !! offset at which T of a pulled mass equals F
-      real(dp), private :: mass_yields = 0.0_dp       !! displacement of a pulled mass per T - F
+      real(dp), private :: mass_yields = 0.0_dp       !! compliance of this offset to T - F
    contains
       procedure :: begin
       procedure :: place_mass
-      procedure :: hang
+      procedure :: set_pull
       procedure :: find_motion
       procedure :: find_held
    end type road_pull_type
@@ -71,7 +71,7 @@ contains
    end subroutine place_mass
 
    !> Set the mean of T that the solver must reach, and the offset from which it starts.
-   pure subroutine hang(self, pull, block, beside)
+   pure subroutine set_pull(self, pull, block, beside)
       class(road_pull_type), intent(in) :: self
       type(friction_pull_type), intent(inout) :: pull !! of the solver; `along` is set
       type(block_motion_type), intent(in) :: block
@@ -85,7 +85,7 @@ contains
          pull%offset = self%q*self%motion
          pull%yielding = 0.0_dp
       end if
-   end subroutine hang
+   end subroutine set_pull
 
    !> Compute the motion of the road from the offset that the solver has found.
    pure subroutine find_motion(self, pull, block, past)

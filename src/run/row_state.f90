@@ -4,7 +4,7 @@
 !> units and meaning. The checkpoint and the restart go through that list. A new variable of the state is a
 !> component and one line of the list.
 !>
-!> Fields of doubles: P, gap and, if there are several rows, U; with Prony arms their state (S, S - S_old
+!> Memory, in fields of doubles: P, gap and, if there are several rows, U; with Prony arms their state (S, S - S_old
 !> and one field per arm); with friction those of module `tangential_state`; with steady phases the last
 !> two steady states.
 module row_state
@@ -64,7 +64,7 @@ module row_state
 
 contains
 
-   !> The table of the state: everything that one row leaves to the next. Collective.
+   !> List the state: everything that one row leaves to the next. Collective.
    subroutine list_state(state, table)
       type(state_type), intent(in), target :: state
       type(state_table_type), intent(out) :: table
@@ -106,7 +106,7 @@ contains
       call list_start('steady/before', state%steady%before, table)
    end subroutine list_state
 
-   !> The position of the run in its phases.
+   !> List the position of the run in its phases.
    subroutine list_schedule(s, table)
       type(schedule_type), intent(in), target :: s
       type(state_table_type), intent(inout) :: table
@@ -140,7 +140,7 @@ contains
          'the velocity was changed since the last row')
    end subroutine list_schedule
 
-   !> The energy books. The area of a cell is not part of the state, but of the case.
+   !> List the energy books. The area of a cell is not part of the state, but of the case.
    subroutine list_books(prefix, books, table)
       character(*), intent(in) :: prefix
       type(energy_books_type), intent(in), target :: books
@@ -155,7 +155,7 @@ contains
       call table%add(prefix//'/arm_du', books%arm_du, 'J', 'p_k.dU of the last step')
    end subroutine list_books
 
-   !> The state of the arms.
+   !> List the state of the arms.
    subroutine list_arms(prefix, arms, table)
       character(*), intent(in) :: prefix
       type(arm_state_type), intent(in), target :: arms
@@ -166,7 +166,7 @@ contains
       call table%add_cells(prefix//'/arm', arms%arm, arms%row, 'Pa', 'tractions of the arms')
    end subroutine list_arms
 
-   !> A state of steady sliding from which the next row may start.
+   !> List a state of steady sliding from which the next row may start.
    subroutine list_start(prefix, start, table)
       character(*), intent(in) :: prefix
       type(steady_start_type), intent(in), target :: start
@@ -180,7 +180,7 @@ contains
       call table%add_field(prefix//'/traction', start%traction, 'Pa', 'tangential traction')
    end subroutine list_start
 
-   !> The tangential part of the state.
+   !> List the tangential part of the state.
    subroutine list_tangential(t, table)
       type(tangential_state_type), intent(in), target :: t
       type(state_table_type), intent(inout) :: table

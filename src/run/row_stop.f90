@@ -5,8 +5,8 @@
 !> the row before. The normal and the tangential solver check this in each iteration (module `stop_watch`), and
 !> rows with friction also between two passes.
 !>
-!> For this purpose `keep` copies at the start of a row what the row changes before it commits a step: P, the
-!> gap, T and T of the step before, the forecast, the contact record, and all scalars. Before the first row P and
+!> For this purpose `keep` copies at the start of a row the parts of the state that it changes before it commits a step:
+!> P, the gap, T and T of the step before, the forecast, the contact record, and all scalars. Before the first row P and
 !> the gap are zero and need no copy. The fields that change only at the end of a step are not copied, because
 !> there may be many of them (the arms). A row whose step is solved in parts needs them, too, once a part is
 !> committed: `keep_more` copies them if they take no more than `most_more`. Otherwise such a row can only be
@@ -43,7 +43,7 @@ module row_stop
 
 contains
 
-   !> At the start of a row, copy what it may change before it commits a step.
+   !> Copy the parts of the state that a row may change before it commits a step.
    subroutine keep(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), intent(inout) :: state       !! unchanged on return
@@ -74,7 +74,7 @@ contains
       end if
    end subroutine keep
 
-   !> If the row has several parts, also copy what the first of them will commit.
+   !> Also copy the fields that the first part of a row with several parts will commit.
    subroutine keep_more(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), intent(in) :: state

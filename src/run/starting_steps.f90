@@ -39,7 +39,7 @@ module starting_steps
       real(dp), allocatable :: slip(:, :, :)       !! m [nx, 2, rows]
    contains
       procedure :: add
-      procedure :: hand_out
+      procedure :: put_into
    end type part_sums_type
 
 contains
@@ -112,7 +112,7 @@ contains
    end subroutine add_slip
 
    !> Put the sums into the row of the step, and the slip of all parts into that of the step.
-   subroutine hand_out(self, row, slip)
+   subroutine put_into(self, row, slip)
       class(part_sums_type), intent(in) :: self
       type(history_row_type), intent(inout) :: row
       real(dp), allocatable, intent(inout) :: slip(:, :, :)   !! m
@@ -129,6 +129,6 @@ contains
       row%residual_normal = self%residual_normal
       row%residual_tangential = self%residual_tangential
       if (allocated(self%slip)) slip(:, :, :) = self%slip
-   end subroutine hand_out
+   end subroutine put_into
 
 end module starting_steps

@@ -1,9 +1,9 @@
 !> The memory of the arms in a state of steady sliding, from which a run continues in time.
 !>
-!> With S = P/G* (module zener: S is the traction that would hold the displacement elastically) arm k
-!> carries the traction p_k = g_k i omega tau_k/(1 + i omega tau_k) S, mode by mode, and so for T. One
-!> step dt earlier a field was the same, moved back by V dt: S_old = rho S with rho = exp(i q.V dt), so
-!> that the first step in time has a step before it.
+!> S = P/G* is the traction that would hold the displacement in an elastic solid of unit modulus (module `zener`). In
+!> each mode arm k then has the traction p_k = g_k i omega tau_k/(1 + i omega tau_k) S, and likewise for T. A time step
+!> dt earlier the fields were the same, but shifted by -V dt: S_old = rho S with rho = exp(i q.V dt). The first step in
+!> time thus has a step before it.
 module steady_memory
    use asperity_parallel, only : any_process, global_sum
    use asperity_precision, only : dp
@@ -23,7 +23,7 @@ module steady_memory
 
 contains
 
-   !> The memory of one component of a field of tractions.
+   !> Set the state of the arms for one component of a field of tractions.
    subroutine remember_field(operator, medium, dt, field, component, arms)
       type(steady_operator_type), intent(inout) :: operator
       type(medium_type), intent(in) :: medium
@@ -77,7 +77,7 @@ contains
 
    end subroutine remember_field
 
-   !> G* of a mode, at the first of the wave vectors that it stands for.
+   !> G* of a mode, at the first of the wave vectors that it represents.
    pure function mode_modulus(medium, i, j) result(modulus)
       type(medium_type), intent(in) :: medium
       integer, intent(in) :: i, j
@@ -89,7 +89,7 @@ contains
       modulus = steady_modulus(medium, dot_product(waves(:, 1), medium%velocity))
    end function mode_modulus
 
-   !> The response of a mode over its traction: the mean over the wave vectors that it stands for.
+   !> The response of a mode over its traction: the mean over the wave vectors that it represents.
    pure function response(medium, dt, which, i, j, first_modulus) result(ratio)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
@@ -126,7 +126,7 @@ contains
       end if
    end function arm_ratio
 
-   !> The stored energy, and what the books keep from the last step.
+   !> Set the stored energy, and the sums that the books keep from the last step.
    subroutine book_memory(medium, dt, p, t, books)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
@@ -156,7 +156,7 @@ contains
          area*total(3:2 + arms), area*total(3 + arms:))
    end subroutine book_memory
 
-   !> Sums over the modes of a row, per area: U.S, dU.dS, and for each arm m_k.p_k and p_k.dU.
+   !> Form the sums over the modes of a row, per area: U.S, dU.dS, and for each arm m_k.p_k and p_k.dU.
    subroutine row_products(medium, dt, j, sums, p, t)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt

@@ -1,4 +1,4 @@
-!> A row of steady sliding within a run: its state, and the memory of the arms if the run continues in time.
+!> A row of steady sliding within a run: its state, and the state of the arms if the run continues in time.
 module steady_row
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp, int8
@@ -18,12 +18,11 @@ module steady_row
 
 contains
 
-   !> Find the row's state, and put it in the place of the last one. A solve that was stopped leaves the state
-   !> unchanged.
+   !> Find the state of the row, and replace the state before by it. A solve that was stopped leaves the state unchanged.
    subroutine slide_for_ever(contact, steady, plan, found)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady
-      type(planned_row_type), intent(inout) :: plan      !! the road moves to where the state finds it
+      type(planned_row_type), intent(inout) :: plan      !! out: the road is where the contact of the state stands on it
       type(found_step_type), intent(inout) :: found
 
       associate (state => contact%state)
@@ -62,7 +61,7 @@ contains
       end associate
    end subroutine take_place
 
-   !> The contact of the state.
+   !> Copy the normal side of the contact to the state.
    subroutine take_fields(contact, steady)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(in) :: steady
@@ -79,7 +78,7 @@ contains
       end associate
    end subroutine take_fields
 
-   !> The tangential side of the state, but for what the arms remember.
+   !> Copy the tangential side of the contact to the state, without the state of the arms.
    subroutine take_tractions(tangential, state, found, velocity)
       type(tangential_step_type), intent(inout) :: tangential
       type(tangential_state_type), intent(inout) :: state
@@ -121,7 +120,7 @@ contains
       tangential%slip(:, :, :) = 0.0_dp
    end subroutine take_tractions
 
-   !> What the arms remember of the state, and its energies.
+   !> Set the state of the arms, and the energies.
    subroutine take_memory(contact, steady, plan)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady

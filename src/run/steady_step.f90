@@ -1,20 +1,21 @@
-!> A row of steady sliding: the state that a road reaches that slides for ever.
+!> A row of steady sliding: the state that a contact reaches when the road has slid at a constant velocity for an
+!> infinite time.
 !>
-!> Solvers: `steady_normal` without friction, `steady_friction` with it. A row that follows a steady row
-!> starts from its state; where two rows went before and only the speed or only the load changes, from
-!> the straight line through both in the logarithm of what changes.
+!> Without friction module `steady_normal` solves it, with friction module `steady_friction`. A row that follows a steady
+!> row starts from the state of that row. If two steady rows precede it and only the speed or only the load changes, it
+!> starts from a linear extrapolation of both states in the logarithm of the speed or of the load.
 !>
-!> The road is read relative to the mean displacement of the contact, which keeps the contact in its place on
-!> the grid from row to row. The road of the row therefore stands where `place` says: at the place of
-!> the first steady row plus that mean displacement.
+!> The road is read relative to the mean displacement of the contact, so that the contact keeps its place on the grid
+!> from row to row. The road of a row is therefore displaced by `place`: the displacement in the first steady row plus
+!> that mean displacement.
 !>
-!> Energy: per area the road does V.(T - P grad H) of work, with T alone where it holds -P grad H. Modes
-!> give the rate of loss exactly. In the sum over cells of -P grad H the slopes of the mesh stand for
-!> those of U_z; taking the loss instead converges faster with the mesh. Hence
+!> Energy: per area and time the road does the work V.(T - P grad H), or V.T if T contains -P grad H. The losses of the
+!> modes give the rate of loss exactly. In the sum of -P grad H over the cells, the slopes of the mesh replace those of
+!> U_z. A force that is computed from the loss converges faster with the mesh. Therefore
 !>
 !>     friction_viscous = [loss by P/|V| + mean(P grad H.dU_T/ds)]/mean P
 !>
-!> which tends to -mean(P dH/ds)/mean P. What friction loses is mean((T - T*).r) |V|.
+!> which tends to -mean(P dH/ds)/mean P. The power lost by friction is mean((T - T*).r) |V| per area.
 module steady_step
    use case_settings, only : case_type
    use asperity_errors, only : error_type
@@ -53,7 +54,7 @@ module steady_step
       procedure :: take
    end type steady_start_type
 
-   !> Solvers and the last states. Not to be copied.
+   !> The solvers and the last states. A variable of this type must not be copied.
    type :: steady_step_type
       type(grid_type) :: grid
       logical :: frictional = .false.
@@ -61,8 +62,8 @@ module steady_step
       type(medium_type) :: medium
       type(steady_contact_type) :: contact             !! the state of the last row
       type(steady_losses_type) :: losses               !! of that state
-      real(dp) :: base(2) = 0.0_dp                     !! place of the road without the offset, m
-      real(dp) :: place(2) = 0.0_dp                    !! of the road in the last row, m
+      real(dp) :: base(2) = 0.0_dp                     !! displacement of the road without the offset, m
+      real(dp) :: place(2) = 0.0_dp                    !! displacement of the road in the last row, m
       real(dp) :: viscous_force(2) = 0.0_dp            !! mean of -P grad H, from the losses, Pa
       real(dp) :: power_friction = 0.0_dp              !! W over the cell
       real(dp) :: scheme_dt = 0.0_dp                   !! for tests: symbols of a scheme with this step, s
@@ -73,7 +74,7 @@ module steady_step
       type(steady_operator_type), private :: operator
       type(steady_normal_type), private :: normal
       type(steady_friction_type), private :: coupled
-      !> Transforms of P and T; of each row of the grid the wave number along y of that number, less 1.
+      !> Transforms of P and T. The index of a row, minus 1, is its wave number along y.
       complex(dp), allocatable, private :: p_modes(:, :), t_modes(:, :, :)
    contains
       procedure :: solve
@@ -131,8 +132,8 @@ contains
       end if
    end subroutine new_steady_step
 
-   !> Become a copy of another start. An assignment would allocate the fields each time, and gfortran does not
-   !> notice where that fails.
+   !> Copy another start. An assignment would allocate the fields each time, and gfortran does not check whether that
+   !> fails.
    subroutine take(self, other)
       class(steady_start_type), intent(inout) :: self
       type(steady_start_type), intent(in) :: other
@@ -149,7 +150,7 @@ contains
       self%traction(:, :, :) = other%traction
    end subroutine take
 
-   !> Forget the states of earlier rows; the next steady row finds the road here.
+   !> Discard the states of earlier rows, and set the displacement of the road for the next steady row.
    subroutine begin_curve(self, place)
       class(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: place(2)                 !! of the road, m
@@ -159,7 +160,7 @@ contains
       self%before%known = .false.
    end subroutine begin_curve
 
-   !> Find the state of a row: the contact, where the road stands, the losses.
+   !> Find the state of a row: the contact, the displacement of the road, and the losses.
    subroutine solve(self, plan, road, outcome, rubbing)
       class(steady_step_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
@@ -202,7 +203,7 @@ contains
       call keep_state(self, problem%target)
    end subroutine solve
 
-   !> The displacement's mean mode: the shear of a block of finite thickness.
+   !> Add the mean mode of the displacement: the shear of a block of finite thickness.
    subroutine add_mean_shear(self)
       type(steady_step_type), intent(inout) :: self
       real(dp) :: mean
@@ -215,7 +216,7 @@ contains
       end do
    end subroutine add_mean_shear
 
-   !> The start of a row: nothing, the last state, or what follows from the last two.
+   !> Set the start of a row: none, the last state, or an extrapolation of the last two.
    subroutine start_from(self, problem)
       type(steady_step_type), intent(inout) :: self
       type(normal_problem_type), intent(inout) :: problem
@@ -228,7 +229,7 @@ contains
       associate (c => self%contact, a => self%last, b => self%before)
          scale = field_sum(a%pressure)/max(field_sum(a%gap), field_sum(b%gap), tiny(1.0_dp))
          do j = 1, self%grid%rows()
-            ! Pressure and gap are one quantity on both sides of zero.
+            ! Pressure and gap are extrapolated as one quantity: the pressure if positive, the scaled gap if negative.
             c%pressure(:, j) = a%pressure(:, j) - scale*a%gap(:, j)
             if (part > 0.0_dp .or. part < 0.0_dp) c%pressure(:, j) = c%pressure(:, j) &
                + part*(c%pressure(:, j) - b%pressure(:, j) + scale*b%gap(:, j))
@@ -243,7 +244,7 @@ contains
       end associate
    end subroutine start_from
 
-   !> How far to extrapolate along the line through the last two states; 0 means no extrapolation.
+   !> The distance of an extrapolation along the line through the last two states, over that of both; 0: none.
    pure function onward(self, target) result(part)
       type(steady_step_type), intent(in) :: self
       real(dp), intent(in) :: target                   !! mean pressure of the row, Pa
@@ -281,7 +282,7 @@ contains
       self%last%traction = self%contact%traction
    end subroutine keep_state
 
-   !> The losses of the state, and the forces that follow from them.
+   !> Compute the losses of the state, and the forces that follow from them.
    subroutine find_losses(self)
       type(steady_step_type), intent(inout) :: self
       real(dp), allocatable :: rows(:, :)
@@ -308,13 +309,13 @@ contains
       direction = self%medium%velocity/speed
       area = self%grid%area()
       self%power_friction = sums(4)*speed*area
-      ! There is no loss from which the force across the motion follows: the slopes of the mesh must do.
+      ! The force perpendicular to the motion does not follow from a loss, and is that of the slopes of the mesh.
       self%viscous_force = -sums(1:2)
       self%viscous_force = self%viscous_force + direction*(self%losses%normal/(speed*area) + sums(3) &
          - dot_product(self%viscous_force, direction))
    end subroutine find_losses
 
-   !> Sums over a row: P grad H, P grad H.(r - e), (T - T*).r.
+   !> Form the sums over a row: P grad H, P grad H.(r - e), (T - T*).r.
    subroutine row_forces(self, j, sums)
       type(steady_step_type), intent(in) :: self
       integer, intent(in) :: j
@@ -339,7 +340,7 @@ contains
       end associate
    end subroutine row_forces
 
-   !> The memory of the normal side, and its stored energy.
+   !> Set the state of the arms of the normal side, and its stored energy.
    subroutine remember_normal(self, dt, arms, books)
       class(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
@@ -351,7 +352,7 @@ contains
       call book_memory(self%medium, dt, self%p_modes, none, books)
    end subroutine remember_normal
 
-   !> The same of the tangential side.
+   !> Do the same for the tangential side.
    subroutine remember_tangential(self, dt, arms, books)
       class(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: dt

@@ -2,7 +2,7 @@
 !>
 !> This is plain data, with which module `tangential_step` solves a step.
 !>
-!> Fields of doubles with two components each: T, T of the step before, U, T - T* of the step before at the
+!> Memory, in fields of doubles with two components each: T, T of the step before, U, T - T* of the step before at the
 !> rubber's own points; those of the forecast of U_T; the state of the arms (S, S - S_old, one field per arm).
 module tangential_state
    use asperity_errors, only : error_type
@@ -41,7 +41,7 @@ module tangential_state
 
 contains
 
-   !> A block at rest.
+   !> Make the state of a block at rest.
    subroutine new_tangential_state(self, case, grid, material, error)
       type(tangential_state_type), intent(out) :: self
       type(case_type), intent(in) :: case

@@ -1,15 +1,15 @@
 !> The tangential side of a step: the tractions, displacements and slip of a rubber block that is driven over a
 !> road, with the viscoelasticity of the block and the inertia of its mean motion.
 !>
-!> Slip of a step: r = DX - U', DX = U + (D' - D), U' = A(T + T_h)/Q with the traction T_h of the
-!> past. The solver works with Q r = DX' - A(T + T_h), DX' = Q DX. The mean of a block
-!> with mass moves by the rule of module block_motion; the part of the mean traction that accelerates the
-!> mass does not deform the rubber.
+!> The slip of a step is r = DX - U' with DX = U + (D' - D) and U' = A(T + T_h)/Q, where U and D are the displacements
+!> of the surface and of the road, a prime marks the end of the step, Q is the modulus of the step and T_h the traction
+!> of the past. The solver works with Q r = DX' - A(T + T_h), where DX' = Q DX. The mean of a block with mass moves by
+!> the rule of module `block_motion`; the part of the mean traction that accelerates the mass does not deform the rubber.
 !>
-!> The loss by friction is that of the mean traction over the step, second order in its length.
+!> The loss by friction is that of the mean traction over the step (module `friction_books`).
 !>
-!> Fields of doubles besides the state, two components each: the trial U', slip, DX', T_h; those of the
-!> solver.
+!> Memory beside the state, in fields of doubles with two components each: the trial U', slip, DX', T_h; and those of
+!> the solver.
 module tangential_step
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
    use case_settings, only : case_type
@@ -47,8 +47,8 @@ module tangential_step
       logical, private :: slip_expected = .false.     !! `slip` is about that of the step
       logical :: pulled(2) = .false.                  !! the road is pulled by a force along x, y
       type(road_pull_type) :: road                    !! that force, and the motion that follows from it
-      !> The share of its bound that each cell may carry, in place of the rule of contact [nx, rows];
-      !> not allocated: not given.
+      !> The share of its bound that each cell may carry [nx, rows]. If it is not allocated, cells in contact carry the
+      !> whole bound.
       real(dp), allocatable :: share(:, :)
       type(convolution_type), private :: operator
       type(friction_solver_type), private :: solver
@@ -110,7 +110,7 @@ contains
       type(zener_type), intent(in) :: material
       real(dp), intent(in) :: motion(2)               !! D' - D, m; a guess where pulled
       real(dp), intent(in) :: dt                      !! s; 0: instantaneous
-      logical, intent(in) :: pulled(2)                !! the road hangs on a force along x, y
+      logical, intent(in) :: pulled(2)                !! a force pulls the road along x, y
       real(dp), intent(in) :: pull(2)                 !! that force, over the cell, Pa
       real(dp) :: height, mean(2), shift(2)
       integer :: c, j
@@ -126,8 +126,8 @@ contains
       self%slip_expected = .false.
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. state%moved) return
-      ! When the road returns to where it began, only round-off is left of the displacements: it must not be
-      ! the scale of the residual.
+      ! If the road returns to where it began, only round-off is left of the displacements. The least scale keeps it from
+      ! being the scale of the residual.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
       if (.not. dt > 0.0_dp) state%pace = 0.0_dp
       call past_traction(state%arms, material, self%past)
@@ -152,10 +152,9 @@ contains
       end if
    end subroutine begin
 
-   !> Tell the solver how the road is pulled. The pull minus the mean of T acts on the slopes of the road without
-   !> friction: on all slopes if `slope_effect` is off, otherwise on the slopes outside the contact, which
-   !> attraction pulls at.
-   subroutine hang_road(self, state, pressure, slope_x, slope_y)
+   !> Set the pull of the road in the solver. The part of the pull that T does not balance acts on the slopes of the road:
+   !> on all slopes if `slope_effect` is off, otherwise only on those outside the contact, through the attraction.
+   subroutine set_pull(self, state, pressure, slope_x, slope_y)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
       real(dp), intent(in) :: pressure(:, :), slope_x(:, :), slope_y(:, :)
@@ -165,10 +164,10 @@ contains
       beside = 0.0_dp
       if (self%adhesive .or. .not. self%law%slope) &
          beside = force_beside(state%contact, self%law%slope, pressure, slope_x, slope_y)/self%grid%cells()
-      call self%road%hang(self%solver%pull, state%block, beside)
-   end subroutine hang_road
+      call self%road%set_pull(self%solver%pull, state%block, beside)
+   end subroutine set_pull
 
-   !> Compute the motion of the pulled road from what the solver has found.
+   !> Compute the motion of the pulled road from the solution.
    subroutine find_motion(self, state)
       type(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -178,8 +177,8 @@ contains
       if (self%road%slides_off) call self%road%find_held(self%solver%pull, means(self, state%traction))
    end subroutine find_motion
 
-   !> After the step is solved, add the motion of the pulled road to the displacements, which were computed
-   !> with a guess of it.
+   !> Correct the displacements of a solved step for the motion of the pulled road, because they were computed with a
+   !> guess of this motion.
    subroutine take_motion(self, motion)
       class(tangential_step_type), intent(inout) :: self
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
@@ -196,8 +195,8 @@ contains
       self%motion = motion
    end subroutine take_motion
 
-   !> Extrapolate the traction: the step starts as if the change of the last step continued. To be called
-   !> once per step, after the road has moved.
+   !> Extrapolate the traction: the step starts as if the change of the last step continued. This must be called exactly
+   !> one time per step, after the road has moved.
    subroutine extrapolate(self, state, steady)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state
@@ -207,8 +206,8 @@ contains
       call state%extrapolate(self%dt, self%solver%near)
    end subroutine extrapolate
 
-   !> Expect the surface at a place at the end of the step. Cells that slip far start in the direction of the
-   !> slip that follows from it; in later passes of the step, of the slip that the last pass has found.
+   !> Set the expected slip from the expected place of the surface at the end of the step. In the first pass cells that
+   !> slip far start in the direction of this slip, and in later passes in that of the slip that the last pass has found.
    subroutine expect(self, state, place)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -256,7 +255,7 @@ contains
       else
          call mark_contact(self%adhesive, pressure, gap, state%contact)
       end if
-      call hang_road(self, state, pressure, slope_x, slope_y)
+      call set_pull(self, state, pressure, slope_x, slope_y)
       fields%slope_x => slope_x
       fields%slope_y => slope_y
       fields%drive => self%drive
@@ -285,7 +284,7 @@ contains
       end do
    end subroutine find_trial
 
-   !> Slip and trial displacement under given tractions. This does not apply where the road is pulled.
+   !> Compute the slip and the trial displacement under given tractions, for a road that is not pulled.
    subroutine try(self, state, traction)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(in) :: state
@@ -350,7 +349,7 @@ contains
       state%displacement(:, :, :) = self%trial
    end subroutine commit
 
-   !> Mean traction, fraction of the grid that sticks, and mean slip of the step.
+   !> Compute the mean traction, the fraction of the grid that sticks, and the mean slip of the step.
    subroutine sums(self, state, traction, stick, slip)
       class(tangential_step_type), intent(in) :: self
       type(tangential_state_type), intent(in) :: state

@@ -228,9 +228,9 @@ contains
    contains
 
       !> The blocks of a line that are set, or are close enough to one that is.
-      pure function grown(line, reach)
+      pure function grown(line, distance)
          logical, intent(in) :: line(:)
-         integer, intent(in) :: reach
+         integer, intent(in) :: distance
          logical :: grown(size(line))
          integer :: b, k, turns, left, right, length
 
@@ -238,15 +238,15 @@ contains
          grown = line
          length = size(line)
          turns = merge(2, 1, self%periodic)
-         left = reach
-         right = reach
+         left = distance
+         right = distance
          do k = 1, turns*length
             b = 1 + modulo(k - 1, length)
             left = merge(0, left + 1, line(b))
-            if (left <= reach) grown(b) = .true.
+            if (left <= distance) grown(b) = .true.
             b = length + 1 - b
             right = merge(0, right + 1, line(b))
-            if (right <= reach) grown(b) = .true.
+            if (right <= distance) grown(b) = .true.
          end do
       end function grown
 

@@ -97,7 +97,7 @@ contains
       outcome%ffts = self%patch%transforms() - before
    end subroutine solve
 
-   !> The loop of the method: measure, direction, step, update.
+   !> Do the loop of the method: measure, choose the direction, find the step, and update.
    subroutine iterate(self, now, trial, outcome)
       type(adhesion_thesis_type), intent(inout) :: self
       type(adhesion_contact_type), intent(inout) :: now

@@ -271,7 +271,7 @@ contains
       call convolve(self, self%inverse)
    end subroutine transform_inverse
 
-   !> A product on the coarse grid.
+   !> Compute a product on the coarse grid.
    subroutine convolve(self, operator)
       type(adhesion_model_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -286,7 +286,7 @@ contains
       call self%coarse_halo%fetch(self%field)
    end subroutine convolve
 
-   !> Row j of B_h s.
+   !> Compute row j of B_h s.
    subroutine product_row(self, j, s, product)
       class(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j
@@ -320,7 +320,7 @@ contains
       places = self%halo%place(modulo(self%own(j) - 1 + [(k, k=-radius, radius)], self%ny) + 1)
    end function around
 
-   !> Row j of M r.
+   !> Compute row j of M r.
    subroutine inverse_row(self, j, r, z)
       class(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j
@@ -331,7 +331,7 @@ contains
       z(:) = z + self%theta*r
    end subroutine inverse_row
 
-   !> Row j of a coarse field by linear interpolation.
+   !> Compute row j of a coarse field by linear interpolation.
    pure subroutine interpolate(self, j, values)
       type(adhesion_model_type), intent(in) :: self
       integer, intent(in) :: j

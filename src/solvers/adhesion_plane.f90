@@ -74,7 +74,7 @@ contains
       stiffness = now%last_form + totals(2)
    end subroutine measure_along
 
-   !> Row j of both sums, the stiffness without the part of B, which is known.
+   !> Compute the parts of row j of both sums, without the part of B in the stiffness, which is known.
    subroutine measure_along_row(work, now, j, n, row)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(in) :: now

@@ -160,7 +160,7 @@ contains
       if (min(sums(2), sums(3)) > 0.0_dp) cosine = sums(1)/(sqrt(sums(2))*sqrt(sums(3)))
    end function turn
 
-   !> A row of the next iterate, with g = x + f: g - left f - sum gamma (dg - left df).
+   !> Compute a row of the next iterate, with g = x + f: g - left f - sum gamma (dg - left df).
    subroutine combine_row(self, gamma, left, j, f, x)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: gamma(:)

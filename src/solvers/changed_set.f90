@@ -1,13 +1,14 @@
 !> Solves the contact on a set of cells directly with a dense matrix, also after a few cells have changed.
 !>
-!> The matrix K of the set C0 at the start is factored once. For C = C0 without L and with J the
+!> The matrix K of the set C0 at the start is factored once. If the cells L have left and the cells J have joined, the
 !> pressures of C0 are
 !>
 !>     p0 = K^-1 (h + level + sum over L of r_b e_b - sum over J of p_j k_j)
 !>
-!> with r_b the gap that opens at a cell which has left, and k_j the displacement of C0 caused by a joined cell.
-!> The conditions p0 = 0 on L, K p = h + level on J and the load are a small system for r, p_j and the level. Its
-!> columns K^-1 e_b and K^-1 k_j are kept, so that a changed cell costs one pair of triangular solves.
+!> where h are the heights of the road, r_b is the gap that opens at a cell b that has left, e_b its unit vector, and k_j
+!> the displacement of C0 under a unit pressure p_j on a joined cell. The conditions p0 = 0 on L, K p = h + level on J
+!> and the load are a small system for r, p_j and the level. Its columns K^-1 e_b and K^-1 k_j are kept, so that a
+!> changed cell costs one pair of triangular solves.
 !>
 !> If processes share the rows, each has its rows of the fields, and all of them solve the same systems. Cells are
 !> identified by their position in the whole grid and listed in the order of its rows. The displacements that the
@@ -119,7 +120,7 @@ contains
       call solve_factors(self%matrix, self%base(:, 2))
    end subroutine refresh
 
-   !> The cells for which a condition holds, of all processes in the order of the rows of the grid.
+   !> List the cells of all processes for which a condition holds, in the order of the rows of the grid.
    subroutine list_cells(self, condition, listed)
       type(changed_set_type), intent(in) :: self
       logical, intent(in) :: condition(:, :)           !! [nx, rows]
@@ -253,7 +254,7 @@ contains
       call solve_factors(self%matrix, self%columns(:, n))
    end subroutine add_column
 
-   !> The pressure that gives the cells of the set the gap zero, and the load; it may be negative.
+   !> Compute the pressure that gives the cells of the set the gap zero, and the load. It may be negative.
    subroutine solve(self, pressure, level, solved)
       class(changed_set_type), intent(in) :: self
       real(dp), intent(inout) :: pressure(:, :)
@@ -296,7 +297,7 @@ contains
       end do
    end subroutine solve
 
-   !> The pressure of a cell that is in the set, on the process that has it.
+   !> Set the pressure of a cell that is in the set, on the process that has it.
    pure subroutine set_pressure(self, cell, value, pressure)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: cell(2)
@@ -318,14 +319,14 @@ contains
       active = self%held(k) .neqv. self%origin(k) > 0
    end function is_active
 
-   !> The equation of a changed cell: no pressure if it has left, and no gap if it has joined.
+   !> Form the equation of a changed cell: no pressure if it has left, and no gap if it has joined.
    subroutine row_of(self, active, a, row, right)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: active(:)
       integer, intent(in) :: a
       real(dp), intent(out) :: row(:)                  !! for r or p of the changed cells, and the level
       real(dp), intent(out) :: right
-      real(dp), allocatable :: reach(:)                !! displacement by the cells of C0, then by the active ones
+      real(dp), allocatable :: displacement(:)                !! displacement by the cells of C0, then by the active ones
       integer :: b, n, origin
 
       n = size(self%cells, 2)
@@ -336,20 +337,20 @@ contains
             right = -self%base(origin, 1)
             return
          end if
-         allocate (reach(n + size(active)))
+         allocate (displacement(n + size(active)))
          do b = 1, n
-            reach(b) = entry_here(self, cell, self%cells(:, b))
+            displacement(b) = entry_here(self, cell, self%cells(:, b))
          end do
          do b = 1, size(active)
-            reach(n + b) = entry_here(self, cell, self%changed(:, active(b)))
+            displacement(n + b) = entry_here(self, cell, self%changed(:, active(b)))
          end do
-         if (self%grid%shared) reach = global_sum(reach)
+         if (self%grid%shared) displacement = global_sum(displacement)
          do b = 1, size(active)
-            row(b) = dot_product(reach(:n), self%columns(:, active(b)))
-            if (self%origin(active(b)) == 0) row(b) = row(b) + reach(n + b)
+            row(b) = dot_product(displacement(:n), self%columns(:, active(b)))
+            if (self%origin(active(b)) == 0) row(b) = row(b) + displacement(n + b)
          end do
-         row(size(row)) = dot_product(reach(:n), self%base(:, 2)) - 1.0_dp
-         right = self%right(active(a)) - dot_product(reach(:n), self%base(:, 1))
+         row(size(row)) = dot_product(displacement(:n), self%base(:, 2)) - 1.0_dp
+         right = self%right(active(a)) - dot_product(displacement(:n), self%base(:, 1))
       end associate
    end subroutine row_of
 

@@ -33,7 +33,7 @@ module coarse_level
       integer :: nx = 0, ny = 0                    !! blocks
       real(dp) :: cells = 1.0_dp                   !! cells of a block, on average
       real(dp) :: h = 0.0_dp                       !! side of a square cell of the same area, m
-      type(kernel_type) :: kernel                  !! what the solid is, normal
+      type(kernel_type) :: kernel                  !! normal response of the solid
       integer, allocatable :: block_x(:)           !! block of a cell along x, [nx of the grid]
       integer, allocatable :: last_x(:)            !! last cell of a block along x, [nx]
       integer :: strips(2) = 0                     !! first and last row of blocks of this process ...
@@ -61,7 +61,7 @@ contains
    subroutine new_coarse_level(self, grid, kernel, error)
       type(coarse_level_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel      !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel      !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       type(grid_type) :: blocks
       real(dp) :: h
@@ -102,7 +102,7 @@ contains
       call new_convolution(self%normal, blocks, kernel, error, sharing=self%sharing)
    end subroutine new_coarse_level
 
-   !> Sums over the blocks along x of values in single precision.
+   !> Form the sums over the blocks along x of values in single precision.
    pure subroutine sum_blocks_single(self, column, blocks)
       class(coarse_level_type), intent(in) :: self
       real(sp), intent(in) :: column(:)        !! sums over the rows of a row of blocks, [nx of the grid]
@@ -121,7 +121,7 @@ contains
       end do
    end subroutine sum_blocks_single
 
-   !> Sums over the blocks along x of values in double precision.
+   !> Form the sums over the blocks along x of values in double precision.
    pure subroutine sum_blocks_double(self, column, blocks)
       class(coarse_level_type), intent(in) :: self
       real(dp), intent(in) :: column(:)

@@ -25,8 +25,9 @@
 !> against v. It is relative to the largest of several scales: the rms of DX in the contact, that of A T, the offset
 !> of a spring that pulls the road, and `least_scale`.
 !>
-!> Memory in addition to the caller's fields: eleven fields, two for the spectrum of the operator, and two for that of
-!> the preconditioner with its symbols (3/4 of a field); four more from the first use of the fallback on.
+!> Memory in addition to the caller's fields, in fields of doubles: eleven work fields, two for the spectrum of the
+!> operator, two for that of the preconditioner, and 3/4 for the symbols of the latter. The fallback takes four more from
+!> its first use on.
 !>
 !> examples/friction_iterations and docs/benchmarks.md show how the number of iterations depends on the mesh. An
 !> iteration of 'fast' takes one and a half products of the operator if points slip, one if all stick, and one product
@@ -59,8 +60,8 @@ module friction_cg
    integer, parameter, public :: friction_thesis = 2
    integer, parameter, public :: friction_gradient = 3
 
-   integer, parameter :: most_moves = 60         !! of the springs
-   integer, parameter :: idle_moves = 3          !! moves in full slip with little gain: the pull is too large
+   integer, parameter :: most_moves = 60         !! largest number of moves of the springs
+   integer, parameter :: idle_moves = 3          !! moves in full slip with little gain after which the pull is too large
    !> If the mean compliance divided by the length of the map exceeds this, the fast method treats the mean mode
    !> separately. Below this value, that would cost iterations; above it, it saves them.
    real(dp), parameter :: thick = 0.2_dp
@@ -118,7 +119,7 @@ contains
       type(friction_solver_type), intent(inout) :: self
       integer, intent(in) :: method
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel        !! what the solid is, tangential
+      type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
       type(error_type), allocatable, intent(out) :: error
 
       select case (method)
@@ -173,7 +174,7 @@ contains
       result%residual = problem%residual
       result%load_error = self%pull%missed(problem)
       result%reason = reason(self, problem, result)
-      call self%pull%take_off(problem, operator)
+      call self%pull%detach(problem, operator)
       result%ffts = result%ffts + operator%ffts + self%method%ffts
       result%seconds = omp_get_wtime() - result%seconds
    end subroutine solve
@@ -198,7 +199,7 @@ contains
       problem%least_scale = self%least_scale
       if (self%periodic .and. operator%symbols%mean_mode(1)*operator%grid%cells() > thick*self%length) &
          problem%mean_compliance = operator%symbols%mean_mode(1)
-      call self%pull%hang(problem, operator, thick*self%length)
+      call self%pull%attach(problem, operator, thick*self%length)
    end subroutine set_problem
 
    !> The reason why the solve ended.
@@ -223,9 +224,10 @@ contains
       end if
    end function reason
 
-   !> Move the ends of the springs until the total of T equals the pull. Near full slip each move changes the total less
-   !> than the one before. Therefore the next move is made longer (`factor`) if a move gained little. If nothing is
-   !> gained in full slip, the pull exceeds the friction, and the road returns to where the springs began.
+   !> Move the ends of the springs until the total of T equals the pull. A move gains the part of the missing total that
+   !> it supplies. Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`)
+   !> if a move gained little. If nothing is gained in full slip, the pull exceeds the friction, and the road returns to
+   !> where the springs began.
    subroutine meet_pull(self, problem, operator, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem

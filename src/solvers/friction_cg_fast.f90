@@ -5,17 +5,18 @@
 !> along v at the slipping points:
 !>
 !>     g = Z r                               the residual of module `friction_problem`
-!>     lam = what the bound adds to A        approximately r.v/|v|^2; 0 at sticking points
-!>     z = the change of T that would make g vanish, about (A + lam)^-1 g (module `friction_preconditioner`)
-!>     d = z + beta Z d                      beta Polak-Ribiere+
+!>     lam                                   the part of the matrix that the curvature of the bound adds to A; it is
+!>                                           approximately r.v/|v|^2 at slipping points and 0 at sticking points
+!>     z = about (A + lam)^-1 g              the change of T that would make g vanish (`friction_preconditioner`)
+!>     d = z + beta Z d                      beta of Polak and Ribiere, if that is positive, otherwise 0
 !>     alpha = g.d/(d.A d + sum lam |d|^2)
 !>     T' = T + alpha d, returned to bounds  r from A T', or by recurrence if all points stick
 !>
-!> beta is 0 in the first iteration, also after the fallback; if more than a tenth of the contact was released from
-!> its bound and now sticks; after a shortened step; and if d would not be a direction of descent.
+!> beta is also 0 in the first iteration and after the fallback, if more than a tenth of the contact was released from
+!> its bound and now sticks, after a shortened step, and if the former d is not a direction of descent.
 !>
-!> In words: the preconditioner turns the slip that should vanish, g, into the change of traction z that would remove
-!> it if each point kept its state. `turn` adds a part of the last direction. `take_step` moves along d by the length
+!> In words: the preconditioner computes from g, the slip that should vanish, the change of traction z that would remove
+!> it if each point kept its state. `form_direction` adds a part of the last direction. `take_step` moves along d by the length
 !> that the quadratic model gives, and returns every point that is now outside its bound to it. This changes states: a
 !> point that was returned counts as slipping, and a slipping point whose slip has turned against its traction as
 !> sticking. The slip of the new traction is then computed with A, and module `friction_problem` forms g of it for the
@@ -42,7 +43,7 @@ module friction_cg_fast
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, columns_form, convolution_type
    use friction_cg_gradient, only : friction_gradient_type
-   use friction_directions, only : total_of, turn_sums_type, turned_row
+   use friction_directions, only : direction_row, direction_sums_type, total_of
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total
    use friction_preconditioner, only : friction_preconditioner_type, new_friction_preconditioner
@@ -57,12 +58,12 @@ module friction_cg_fast
    public :: friction_fast_type, new_friction_fast
 
    integer, parameter :: patience = 30      !! iterations in which the residual must fall tenfold
-   integer, parameter :: trials = 2         !! of a shorter step
+   integer, parameter :: trials = 2         !! largest number of shorter steps that are tried
    !> A move is shortened if g'.(T' - T) is below -overshoot*alpha*g.d. The first iterations of a solve that starts
    !> near its solution may overshoot more, because shortening costs more there than it gains.
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
-   integer, parameter :: near_steps = 15
-   integer, parameter :: gradient_steps = 100    !! of the fallback at a time
+   integer, parameter :: near_steps = 15    !! number of these first iterations
+   integer, parameter :: gradient_steps = 100    !! largest number of iterations of the fallback at a time
 
    !> The method with its preconditioner and work fields.
    type, extends(friction_method_type) :: friction_fast_type
@@ -92,7 +93,7 @@ contains
    subroutine new_friction_fast(self, grid, kernel, error)
       type(friction_fast_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel        !! what the solid is, tangential
+      type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
       type(error_type), allocatable, intent(out) :: error
 
       call new_friction_preconditioner(self%preconditioner, grid, kernel, error)
@@ -100,7 +101,7 @@ contains
       allocate (self%d(grid%nx, 2, grid%rows()), source=0.0_dp)
    end subroutine new_friction_fast
 
-   !> Iterate, as `friction_method_type` says. If the conjugate gradients stall, the fallback alternates with them.
+   !> Iterate (see `friction_method_type`). If the conjugate gradients stall, the fallback alternates with them.
    subroutine iterate(self, problem, operator, goal, iterations)
       class(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -172,10 +173,10 @@ contains
       beta = 0.0_dp
       if (.not. now%restart) beta = max(0.0_dp, (gz - self%preconditioner%cross)/now%old_gz)
       now%old_gz = gz
-      call turn(self, problem, operator, beta, now)
+      call form_direction(self, problem, operator, beta, now)
       if (now%slope <= 0.0_dp .and. beta > 0.0_dp) then
          self%preconditioner%shift = 0.0_dp                                ! z contains the shift already
-         call turn(self, problem, operator, 0.0_dp, now)
+         call form_direction(self, problem, operator, 0.0_dp, now)
       end if
       call operator%columns(merge(columns_form, columns_apply, problem%slipping > 0), now%form)
       call problem%spring%add_form(self%d, now%form)
@@ -234,21 +235,21 @@ contains
    end subroutine move_to
 
    !> Compute d = z + beta Z d and its transform, the slope g.d, and the curvature of the bounds along d.
-   subroutine turn(self, problem, operator, beta, now)
+   subroutine form_direction(self, problem, operator, beta, now)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: beta
       type(iteration_type), intent(inout) :: now
-      type(turn_sums_type), allocatable :: rows(:)
-      type(turn_sums_type) :: sums
+      type(direction_sums_type), allocatable :: rows(:)
+      type(direction_sums_type) :: sums
       integer :: j
 
       allocate (rows(problem%rows))
       !$omp parallel do default(none) shared(self, problem, operator, beta, rows) &
       !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%rows
-         call turned_row(problem%compliance, beta, self%preconditioner%shift, problem%slip(:, :, j), &
+         call direction_row(problem%compliance, beta, self%preconditioner%shift, problem%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%preconditioner%z(:, :, j), self%d(:, :, j), rows(j))
          call operator%forward_row(1, j, self%d(:, 1, j))
          call operator%forward_row(2, j, self%d(:, 2, j))
@@ -256,7 +257,7 @@ contains
       sums = total_of(rows)
       now%slope = sums%slope
       now%curvature = sums%curvature
-   end subroutine turn
+   end subroutine form_direction
 
    !> Free the preconditioner and the work field.
    subroutine destroy(self)

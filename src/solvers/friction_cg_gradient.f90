@@ -1,8 +1,8 @@
 !> The fallback for the tangential problem: spectral projected gradients.
 !>
-!>     T' = return(T + alpha r)       r: the slip along the slope
-!>     alpha = s.s/s.y or s.y/y.y     s = T' - T, y = r - r' (Barzilai and Borwein, 1988), the shorter
-!>                                    one where the two differ much
+!>     T' = return(T + alpha r)       r: the slip along the slope; return: radially to the bound, if T + alpha r is outside
+!>     alpha = s.s/s.y or s.y/y.y     s = T' - T, y = r - r' (Barzilai and Borwein, 1988); the second one, which is
+!>                                    shorter, if it is less than half of the first one
 !>
 !> An iteration takes one product of the operator, and there is no preconditioner. With the slope effect the
 !> radial return is not a Euclidean projection, but its fixed points are the solutions: T + alpha r is returned to
@@ -32,7 +32,7 @@ module friction_cg_gradient
 
 contains
 
-   !> Iterate, as `friction_method_type` says.
+   !> Iterate (see `friction_method_type`).
    subroutine iterate(self, problem, operator, goal, iterations)
       class(friction_gradient_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -62,7 +62,7 @@ contains
       end do
    end subroutine iterate
 
-   !> s = return(T + alpha r) - T; r is kept.
+   !> Compute s = return(T + alpha r) - T, and keep r.
    subroutine form_step(self, problem, alpha)
       type(friction_gradient_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem

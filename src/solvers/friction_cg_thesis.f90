@@ -5,7 +5,7 @@
 !>     alpha = t.g/(t.A t - K_2.r)                             (eq. 3.12)
 !>     T' = return(T + alpha d) ; r = DX - A T'                (eq. 3.10, 3.11)
 !>     release the points that slip against their traction
-!>     g = r, less its part along D where it slips             (eq. 3.16)
+!>     g = r, minus its part along D where it slips            (eq. 3.16)
 !>     y = g' - g ; beta = -y.g'/t.y + theta t.g' y.y/(t.y)^2   (eq. 3.14)
 !>     d = g' + beta d
 !>
@@ -41,7 +41,7 @@ module friction_cg_thesis
 
 contains
 
-   !> Iterate, as `friction_method_type` says.
+   !> Iterate (see `friction_method_type`).
    subroutine iterate(self, problem, operator, goal, iterations)
       class(friction_thesis_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -75,7 +75,7 @@ contains
       end do
    end subroutine iterate
 
-   !> g, d = g + beta d and t = d + K_1 with its transform; t.g and K_2.r.
+   !> Compute g, d = g + beta d, t = d + K_1 with its transform, t.g and K_2.r.
    subroutine new_direction(self, problem, operator, beta, ascent, bend)
       type(friction_thesis_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -150,7 +150,7 @@ contains
          beta = -products(2)/products(1) + theta*products(3)*products(4)/products(1)**2
    end function next_beta
 
-   !> D, the slip along the slope, and its part perpendicular to D where the point slips.
+   !> Compute D, the slip along the slope, and its part perpendicular to D if the point slips.
    pure subroutine perpendicular(problem, i, j, d, r, g)
       type(friction_problem_type), intent(in) :: problem
       integer, intent(in) :: i, j

@@ -8,9 +8,9 @@ module friction_directions
    implicit none
    private
 
-   public :: scaled_row, total_of, turn_sums_type, turned_row, uniform_type, unscaled_row, z_sums_type
+   public :: direction_row, direction_sums_type, scaled_row, total_of, uniform_type, unscaled_row, z_sums_type
 
-   !> The part of the mean mode that is treated apart from the preconditioner (module
+   !> The part of the mean mode that is treated separately from the preconditioner (module
    !> `friction_preconditioner`): c, and the mean displacement that it causes, (h/N) E c.
    type :: uniform_type
       real(dp) :: traction(2) = 0.0_dp       !! c, Pa
@@ -25,15 +25,15 @@ module friction_directions
       real(dp) :: bent(2) = 0.0_dp           !! (curvature of the bound) w z
    end type z_sums_type
 
-   !> Sums of `turned_row`.
-   type :: turn_sums_type
+   !> Sums of `direction_row`.
+   type :: direction_sums_type
       real(dp) :: slope = 0.0_dp             !! g.d
       real(dp) :: curvature = 0.0_dp         !! of the bounds along d
-   end type turn_sums_type
+   end type direction_sums_type
 
    !> Sums over all rows, in order.
    interface total_of
-      module procedure :: total_of_z, total_of_turns
+      module procedure :: total_of_z, total_of_directions
    end interface total_of
 
 contains
@@ -116,7 +116,7 @@ contains
    end subroutine unscaled_row
 
    !> Compute d = z + w Z c + beta Z d and z' = z + w Z c in a row, g.d, and the curvature of the bounds along d.
-   pure subroutine turned_row(compliance, beta, c, r, tangent, z, d, sums)
+   pure subroutine direction_row(compliance, beta, c, r, tangent, z, d, sums)
       real(dp), intent(in) :: compliance
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: c(2)                   !! Pa
@@ -124,7 +124,7 @@ contains
       real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
       real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2]
       real(dp), intent(inout), contiguous :: d(:, :)       !! [nx, 2] Pa
-      type(turn_sums_type), intent(out) :: sums
+      type(direction_sums_type), intent(out) :: sums
       real(dp) :: slope, curvature
       real(dp) :: av, ax, ay, cx, cy, weight
       integer :: i
@@ -148,8 +148,8 @@ contains
          d(i, 1) = ax
          d(i, 2) = ay
       end do
-      sums = turn_sums_type(slope, curvature)
-   end subroutine turned_row
+      sums = direction_sums_type(slope, curvature)
+   end subroutine direction_row
 
    !> Sums of a preconditioned field.
    function total_of_z(rows) result(total)
@@ -168,9 +168,9 @@ contains
    end function total_of_z
 
    !> Sums of a direction.
-   function total_of_turns(rows) result(total)
-      type(turn_sums_type), intent(in) :: rows(:)
-      type(turn_sums_type) :: total
+   function total_of_directions(rows) result(total)
+      type(direction_sums_type), intent(in) :: rows(:)
+      type(direction_sums_type) :: total
       real(dp), allocatable :: packed(:, :)
       real(dp) :: sums(2)
       integer :: j
@@ -180,7 +180,7 @@ contains
          packed(:, j) = [rows(j)%slope, rows(j)%curvature]
       end do
       sums = row_totals(packed)
-      total = turn_sums_type(sums(1), sums(2))
-   end function total_of_turns
+      total = direction_sums_type(sums(1), sums(2))
+   end function total_of_directions
 
 end module friction_directions

@@ -32,7 +32,7 @@ module friction_fields
       integer(int8), pointer, contiguous :: contact(:, :) => null()
    end type friction_fields_type
 
-   !> Fields of a solution beside the caller's; module `friction_rows` says what they hold.
+   !> Fields of a solution in addition to the caller's. Module `friction_rows` describes their contents.
    type :: friction_work_type
       real(dp), allocatable :: bound(:, :, :)      !! [nx, 2, rows] F, Pa, and N_z of the road
       real(dp), allocatable :: tangent(:, :, :)    !! [nx, 3, rows] direction of slip and weight

@@ -4,21 +4,26 @@
 !> With the names of module `friction_cg_fast`,
 !>
 !>     g = Z r                               the residual of module `friction_problem`
-!>     lam = curvature of the bound          about r.v/|v|^2, 0 where it sticks
+!>     lam                                   curvature of the bound, about r.v/|v|^2; 0 where a point sticks
 !>     w = a_0/(a_0 + lam)                   a_0: displacement of a cell under its own unit traction
-!>     z = Z [w M (w g) + (1-w)/(a_0+lam) g] M: inverse of the periodic 2 x 2 symbol
+!>     z = Z [w M (w g) + (1-w)/(a_0+lam) g] M: convolution whose symbol is the inverse of that of A, a 2 x 2 matrix
+!>                                           for each wave vector of the periodic grid
 !>
 !> If all points slip far, lam is much larger than a_0 and w is small. The displacement of a cell is then
 !> negligible compared with the curvature of the bounds, and the term with M even more so, because it has the
 !> factor w^2. In this case z = w/a_0 g is used, which needs no transforms and as many iterations.
 !>
-!> In a thick block the mean mode h of a periodic operator (for G = 1) is by far its largest. Every field that is
-!> zero outside the contact excites it. It is eliminated from g and z with the two fields e = w Z of
-!> uniform traction: with E = sum of w Z, H = A + lam, and A ~ h/N on the mean, H e = (h/N) E + lam w Z and
-!> K = e.H e = (h/N) E E + sum of lam w^2 Z,
+!> In a thick block the compliance h of the mean mode of a periodic operator (for G = 1) is by far the largest one. Every
+!> field that is zero outside the contact excites this mode. It is therefore eliminated from g and z (deflation) with the
+!> two fields e = w Z of a uniform traction along x and along y. On the mean of the N cells A is about h/N. With
+!> E = sum of w Z and H = A + lam,
+!>
+!>     H e = (h/N) E + lam w Z,     K = e.H e = (h/N) E E + sum of lam w^2 Z
+!>
+!> and z is computed in three steps:
 !>
 !>     c = K^-1 sum(w g)
-!>     Z (g - H e c) goes through the preconditioner to z0
+!>     z0 = the preconditioner above, applied to Z (g - H e c)
 !>     z = z0 + e (c - K^-1 (H e).z0)
 !>
 !> The last term is added later, by the sweep that forms the next direction: it adds w Z `shift` to z.
@@ -60,7 +65,7 @@ contains
    subroutine new_friction_preconditioner(self, grid, kernel, error)
       type(friction_preconditioner_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel        !! what the solid is, tangential
+      type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
       type(error_type), allocatable, intent(out) :: error
       type(grid_type) :: periodic
       type(kernel_type) :: block
@@ -185,7 +190,7 @@ contains
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
       integer, intent(in) :: j
-      type(z_sums_type), intent(inout) :: sums     !! with g.z_old when the row begins
+      type(z_sums_type), intent(inout) :: sums     !! in: with g.z_old
 
       call self%inverse%backward_row(1, j, self%z(:, 1, j))
       call self%inverse%backward_row(2, j, self%z(:, 2, j))
@@ -193,7 +198,7 @@ contains
          problem%work%tangent(:, :, j), self%z(:, :, j), sums)
    end subroutine unscale_row
 
-   !> K^-1 and (h/N) E. They are 0 if the mean mode is not treated separately.
+   !> Compute K^-1 and (h/N) E. They are 0 if the mean mode is not treated separately.
    subroutine mean_mode(problem, inverse, coupling)
       type(friction_problem_type), intent(in) :: problem
       real(dp), intent(out) :: inverse(2, 2)

@@ -36,7 +36,7 @@ module friction_problem
 
    !> A point whose s (module `friction_law`) is below this value is on its bound.
    real(dp), parameter :: on_bound = 1.0_dp + 1.0e-9_dp
-   real(dp), parameter :: deepest_inside = 4.0_dp         !! a slipping point whose s is above it sticks
+   real(dp), parameter :: deepest_inside = 4.0_dp         !! a slipping point whose s is above it sticks from then on
    real(dp), parameter :: far = 10.0_dp                   !! a long slip, in units of a_0 F
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
@@ -47,8 +47,8 @@ module friction_problem
       integer :: rows = 0                    !! of this process
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
-      !> Compliance of the mean mode along x and y over the number of cells, where this mode is soft and
-      !> is therefore treated apart; else 0.
+      !> Compliance of the mean mode along x and y, divided by the number of cells, if this mode is soft and is
+      !> therefore treated separately; otherwise 0.
       real(dp) :: mean_compliance(2) = 0.0_dp
       real(dp) :: least_scale = 0.0_dp       !! least `scale`, m: keeps round-off from counting as displacement
       logical :: near = .false.              !! T starts near the solution
@@ -59,7 +59,7 @@ module friction_problem
       type(row_constants_type) :: constants
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
       integer :: cells = 0                   !! in contact
-      integer :: foreseen = 0                !! of them started along the slip that was expected
+      integer :: foreseen = 0                !! cells in contact that started along the slip that was expected
       integer :: slipping = 0                !! on the bound
       integer :: released = 0                !! points that left the bound since the last move
       type(measure_sums_type) :: sums        !! of the last measure
@@ -116,7 +116,7 @@ contains
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
-      integer, intent(out) :: foreseen             !! of them started along the slip that is expected
+      integer, intent(out) :: foreseen             !! cells in contact that start along the slip that is expected
       real(dp), intent(out) :: size                !! |T|^2, Pa^2
       real(dp) :: limit, s, site(self%nx, site_columns), t(2)
       integer :: i
@@ -171,7 +171,7 @@ contains
       foreseen = foreseen + 1
    end subroutine start_along_slip
 
-   !> Put the traction of a point on its bound if its s is below a limit.
+   !> Put the traction of a point on its bound if its s (module `friction_law`) is below a limit.
    pure subroutine place_on_bound(self, i, j, limit, t, s)
       class(friction_problem_type), intent(in) :: self
       integer, intent(in) :: i, j

@@ -35,8 +35,8 @@ module friction_pull
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
       real(dp), private :: mean_mode(2) = 0.0_dp !! symbols that were removed from the operator
    contains
-      procedure :: hang
-      procedure :: take_off
+      procedure :: attach
+      procedure :: detach
       procedure :: missed
       procedure :: lacking
    end type friction_pull_type
@@ -44,7 +44,7 @@ module friction_pull
 contains
 
    !> Attach the road to its springs.
-   subroutine hang(self, problem, operator, soft)
+   subroutine attach(self, problem, operator, soft)
       class(friction_pull_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -70,14 +70,14 @@ contains
          problem%mean_compliance(c) = merge(problem%spring%compliance(c), 0.0_dp, &
             problem%spring%compliance(c)*cells > soft)
       end do
-      ! Least distance that the pull moves the road. If everything sticks without strain, there is no other
-      ! measure.
+      ! The distance that the pull moves the road is the least scale, because there is no other one if all points stick
+      ! without strain.
       problem%least_scale = max(problem%least_scale, norm2(self%mean_mode*problem%spring%pull), &
          problem%compliance/sqrt(touching)*norm2(problem%spring%pull))
-   end subroutine hang
+   end subroutine attach
 
    !> Restore the mean mode of the operator, and add the displacement of this mode to the offset of the road.
-   subroutine take_off(self, problem, operator)
+   subroutine detach(self, problem, operator)
       class(friction_pull_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -90,7 +90,7 @@ contains
          self%offset(c) = problem%spring%offset(c) &
             + self%mean_mode(c)*(problem%spring%total(c) + past_total(problem, c))
       end do
-   end subroutine take_off
+   end subroutine detach
 
    !> Sum of T_h along a direction, Pa.
    function past_total(problem, c) result(total)

@@ -78,7 +78,7 @@ module friction_rows
 
 contains
 
-   !> First half of a move: T + step d. `returned_row` then returns points to their bounds.
+   !> Do the first half of a move: T + step d. `returned_row` then returns points to their bounds.
    pure subroutine stepped_row(move, d, tangent, state, t, old, slips)
       type(move_type), intent(in) :: move
       real(dp), intent(in), contiguous :: d(:, :)          !! [nx, 2] Pa
@@ -105,7 +105,7 @@ contains
       end do
    end subroutine stepped_row
 
-   !> Second half of a move: points that slipped are returned to their bound from both sides, others only from
+   !> Do the second half of a move: return points that slipped to their bound from both sides, and others only from
    !> outside. The uniform part of the move is added first at points that stuck.
    pure subroutine returned_row(k, uniform, site, slips, old, t, state, sums)
       type(row_constants_type), intent(in) :: k
@@ -167,17 +167,17 @@ contains
       sums = move_sums_type(moved, changed, size_of_t, [missed_x, missed_y], [xx, xy, yy])
    end subroutine returned_row
 
-   !> force/reach; 1 where both vanish, unbounded where only the reach does or it is negative.
+   !> The ratio s of the bound: force/reach, 1 if both vanish, and unbounded if the reach is negative or alone vanishes.
    elemental function ratio(force, reach) result(s)
-      real(dp), intent(in) :: force     !! >= 0, Pa
-      real(dp), intent(in) :: reach     !! Pa
+      real(dp), intent(in) :: force     !! F, >= 0, Pa
+      real(dp), intent(in) :: reach     !! m - mu n.D, Pa
       real(dp) :: s
 
       s = merge(force/merge(reach, 1.0_dp, reach > 0.0_dp), &
          merge(1.0_dp, unbounded, reach >= 0.0_dp .and. force <= 0.0_dp), reach > 0.0_dp)
    end function ratio
 
-   !> First half of a measure: find out how each point may move, and release points that slip against their
+   !> Do the first half of a measure: find out how each point may move, and release points that slip against their
    !> traction. With the direction of slip v = S^-1 D, the bound is |S^-1/2 D| = const to first order (without its
    !> change with n.D). It has the multiplier lam = r.v/|v|^2, and the curvature lam e.(S^-1 e)/|e|^2 along its
    !> tangent e.
@@ -224,7 +224,7 @@ contains
       end do
    end subroutine tangent_row
 
-   !> Second half of a measure: form the sums of a row, using `tangent`.
+   !> Do the second half of a measure: form the sums of a row, using `tangent`.
    pure subroutine measured_row(compliance, t, old, r, drive, state, tangent, sums)
       real(dp), intent(in) :: compliance                   !! a_0
       real(dp), intent(in), contiguous :: t(:, :)          !! [nx, 2] Pa

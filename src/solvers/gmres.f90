@@ -12,7 +12,7 @@
 !>    end do
 !>    call krylov%solution(x)
 !>
-!> A vector has some numbers for each cell of a list, and one additional number. The list is ordered by the
+!> A vector has some numbers for each cell of a list, and one additional number (`beside`). The list is ordered by the
 !> rows of the grid, and sums are formed by row and added up in order, so that they do not depend on the number of
 !> threads or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6.
 !> Memory is allocated for each direction when it is needed; if there is none left, the method ends.
@@ -28,7 +28,7 @@ module gmres
    !> A vector.
    type :: cell_vector_type
       real(dp), allocatable :: cells(:, :)          !! [numbers, cells of this process]
-      real(dp) :: beside = 0.0_dp
+      real(dp) :: beside = 0.0_dp                   !! the additional number
    end type cell_vector_type
 
    !> A direction, of unit length.
@@ -47,6 +47,7 @@ module gmres
       real(dp), private :: length = 0.0_dp          !! |b|
       integer, allocatable, private :: first(:)     !! [rows + 1] the first cell of each row in the list
       type(direction_type), allocatable, private :: basis(:)   !! [most + 1], so far used + 1
+      ! The least squares problem: its triangular matrix, the rotations that made it triangular, and its right side.
       real(dp), allocatable, private :: triangle(:, :), rotation(:, :), right(:)
    contains
       procedure :: begin
@@ -163,7 +164,7 @@ contains
       self%left = abs(self%right(n + 1))/self%length
    end subroutine take
 
-   !> The x with the least |b - A x|.
+   !> Compute the x with the least |b - A x|.
    subroutine solution(self, x)
       class(gmres_type), intent(in) :: self
       type(cell_vector_type), intent(inout) :: x    !! its values are not read

@@ -1,7 +1,7 @@
 !> The states of a cell in the joint equations of a step with friction, in one number per cell.
 !>
 !> A cell is open, or it touches without pressure in a part of its area, or it is in contact. The number
-!> s, a length, determines the state:
+!> s, a length, determines the state and its ranges are
 !>
 !>     s < 0              open: the gap is -s, no pressure but that of adhesion, no traction
 !>     0 <= s <= width    touches: no gap, no pressure of the wall, the share s/width of the bound
@@ -24,7 +24,7 @@ module joint_cells
       type(adhesion_potential_type) :: potential
       type(friction_law_type) :: law
       real(dp) :: soft = 0.0_dp                     !! displacement of a cell under its own unit pressure, m/Pa
-      real(dp) :: soft_along = 0.0_dp               !! the same of the tangential traction, m/Pa
+      real(dp) :: soft_along = 0.0_dp               !! the same for the tangential traction, m/Pa
       real(dp) :: width = 0.0_dp                    !! of the second range, m
       real(dp) :: attraction = 0.0_dp               !! of a cell without a gap, Pa
       !> Rate at which the pressure rises within the second range, relative to the rate above it. The law demands 0;
@@ -36,7 +36,7 @@ module joint_cells
       procedure :: gap_of
       procedure :: pressure_of
       procedure :: share_of
-      procedure :: lacking
+      procedure :: traction_error
       procedure :: slips
    end type cell_rules_type
 
@@ -53,7 +53,7 @@ contains
       yes = yes .or. self%attraction > 0.0_dp .or. self%law%reach_coefficient()*hypot(slope_x, slope_y) > 1.0_dp
    end function has_jump
 
-   !> s of a cell in contact or open.
+   !> s of a cell that is in contact or open.
    elemental function number_of(self, width, touching, pressure, gap) result(s)
       class(cell_rules_type), intent(in) :: self
       real(dp), intent(in) :: width
@@ -65,7 +65,7 @@ contains
       if (touching) s = width + max(pressure + self%attraction, 0.0_dp)*self%soft
    end function number_of
 
-   !> Gap, m.
+   !> The gap, m.
    elemental function gap_of(self, s) result(gap)
       class(cell_rules_type), intent(in) :: self
       real(dp), intent(in) :: s
@@ -74,7 +74,7 @@ contains
       gap = max(-s, 0.0_dp)
    end function gap_of
 
-   !> Pressure, attraction included, Pa.
+   !> The pressure, attraction included, Pa.
    elemental function pressure_of(self, width, s) result(pressure)
       class(cell_rules_type), intent(in) :: self
       real(dp), intent(in) :: width, s
@@ -96,27 +96,27 @@ contains
 
    !> The difference between the traction of a cell and the admissible one that follows from this traction and
    !> the slip. It is zero if the cell obeys the law.
-   pure function lacking(self, share, pressure, slope, slip, t) result(left)
+   pure function traction_error(self, share, pressure, slope, slip, t) result(error)
       class(cell_rules_type), intent(in) :: self
       real(dp), intent(in) :: share
       real(dp), intent(in) :: pressure              !! Pa
       real(dp), intent(in) :: slope(2)
       real(dp), intent(in) :: slip(2)               !! m
       real(dp), intent(in) :: t(2)                  !! Pa
-      real(dp) :: left(2)
+      real(dp) :: error(2)
       real(dp) :: wanted(2), s
 
-      left = t
+      error = t
       if (.not. share > 0.0_dp) return
       wanted = t + self%law%slip_along_slope(slope, slip)/self%soft_along
       if (self%law%jumps_at_edge()) then
          call self%law%place_on_bound(share*pressure, slope, 1.0_dp, wanted, s, [1.0_dp, share])
-         left = t - wanted
+         error = t - wanted
       else
          call self%law%place_on_bound(pressure, slope, 1.0_dp, wanted, s)
-         left = t - share*wanted
+         error = t - share*wanted
       end if
-   end function lacking
+   end function traction_error
 
    !> Is the traction of a cell on its bound?
    pure function slips(self, share, pressure, slope, t) result(yes)

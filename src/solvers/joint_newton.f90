@@ -1,10 +1,11 @@
 !> Newton's method for all unknowns of a contact with friction: the pressures, gaps, tractions and the level
 !> (module `joint_system`).
 !>
-!> Newton's steps are computed by GMRES with products from differences of the equations, and shortened if they do
-!> not reduce the residual. The gaps of open cells are not unknowns, but follow from the others (with adhesion
-!> only if they are hardly attracted). If this fails and a traction may jump, the pressure is made to rise
-!> slightly in partly sheared cells, which removes the jump, and this rise is then reduced to zero (`descend`).
+!> Newton's steps are computed by GMRES, whose products with the derivative of the equations are finite differences.
+!> They are shortened if they do not reduce the residual. The gaps of open cells are not unknowns, but follow from the
+!> other unknowns (with adhesion only those of cells that are hardly attracted). If the method fails and a traction may
+!> jump, the equations are regularised: the pressure rises slightly with s in partly sheared cells, which removes the
+!> jump. This rise is then reduced to zero (`reduce_rise`).
 !>
 !> Memory: 25 fields of doubles, and the directions of GMRES with 3 numbers in single precision per unknown cell
 !> and direction. If there is not enough memory, nothing is solved.
@@ -23,19 +24,21 @@ module joint_newton
    public :: joint_newton_type
 
    integer, parameter :: most_steps = 25
-   integer, parameter :: few_steps = 3                 !! that must halve the residual of a hasty solution
+   integer, parameter :: few_steps = 3                 !! steps that must halve the residual if the method is `hasty`
    integer, parameter :: most_directions = 120         !! directions of GMRES for a step
    real(dp), parameter :: accuracy = 1.0e-4_dp         !! of a solve by GMRES
    real(dp), parameter :: far = 0.1_dp                 !! residual from which `far_accuracy` is sufficient
    real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
-   real(dp), parameter :: attracted = 1.0e-4_dp        !! e'' over the stiffness of a cell, for it to be unknown
-   real(dp), parameter :: astray = 100.0_dp            !! a residual this much larger than the first ends the attempt
+   !> If |e''| over the stiffness of a cell is larger, the gap of an open cell is an unknown.
+   real(dp), parameter :: attracted = 1.0e-4_dp
+   real(dp), parameter :: diverged = 100.0_dp          !! a residual this much larger than the first ends the attempt
    real(dp), parameter :: idle = 1.0e-4_dp             !! part by which a step must reduce the residual
-   real(dp), parameter :: share_of_tolerance = 1.0e-3_dp, round_off = 1.0e-11_dp   !! of the residual that may remain
+   !> Residual that may remain, over the tolerance, and its least value.
+   real(dp), parameter :: part_of_tolerance = 1.0e-3_dp, round_off = 1.0e-11_dp
    real(dp), parameter :: lengths(10) = [1.0_dp, 0.7_dp, 0.5_dp, 0.3_dp, 0.15_dp, 0.07_dp, 0.03_dp, 0.01_dp, &
-      0.003_dp, 0.001_dp]                              !! of a step
+      0.003_dp, 0.001_dp]                              !! of a step, tried in this order
    ! The rise of the pressure in partly sheared cells:
-   integer, parameter :: most_descents = 30            !! largest number of solves with a rise
+   integer, parameter :: most_rises = 30               !! largest number of solves with a rise
    real(dp), parameter :: first_factor = 0.1_dp        !! from one solve to the next
    real(dp), parameter :: last_factor = 0.95_dp        !! the solutions end if even this factor fails
    real(dp), parameter :: least_rise = 1.0e-5_dp, most_rise = 1.0e2_dp
@@ -44,11 +47,12 @@ module joint_newton
    type :: joint_newton_type
       logical :: ready = .false.
       real(dp) :: far_accuracy = accuracy              !! of a solve by GMRES far from the solution
-      logical :: hasty = .false.                       !! give up if the residual falls slowly, and do not descend
+      logical :: hasty = .false.                       !! give up if the residual falls slowly, and do not try a rise
       type(joint_state_type) :: now                    !! in: the start; out: the solution
       integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
       integer, allocatable, private :: cell(:)         !! its cells, i
-      type(joint_state_type), private :: trial, best, begun
+      type(joint_state_type), private :: trial, best   !! after a part of a step, and the best of these
+      type(joint_state_type), private :: begun         !! from which the present solve began
       real(dp), allocatable, private :: follow(:, :)   !! change of s of the cells that are not unknown, m [nx, rows]
    contains
       procedure :: prepare
@@ -84,11 +88,11 @@ contains
       logical, intent(out) :: solved
       real(dp) :: goal
 
-      goal = max(share_of_tolerance*tolerance, round_off)
+      goal = max(part_of_tolerance*tolerance, round_off)
       call self%begun%copy(self%now)
       call iterate(self, system, goal, solved)
       if (.not. solved .and. .not. self%hasty .and. field_count(system%width > 0.0_dp) > 0) &
-         call descend(self, system, goal, solved)
+         call reduce_rise(self, system, goal, solved)
    end subroutine solve
 
    !> Must the attempt end, because of a stop or because it takes too long?
@@ -114,7 +118,7 @@ contains
       first = self%now%merit
       marked = first
       do k = 1, most_steps
-         if (.not. self%now%worst > goal .or. self%now%merit > astray*first) exit
+         if (.not. self%now%worst > goal .or. self%now%merit > diverged*first) exit
          if (is_to_end(system)) exit
          if (self%hasty .and. mod(k, few_steps) == 1) then
             if (k > 1 .and. self%now%merit > 0.5_dp*marked) exit
@@ -127,9 +131,9 @@ contains
       solved = self%now%worst <= goal
    end subroutine iterate
 
-   !> Solve with a pressure that rises within the second range, and reduce this rise to zero step by step. Each
-   !> solve starts from the solution before.
-   subroutine descend(self, system, goal, solved)
+   !> Solve with a pressure that rises within the second range of s, and reduce this rise to zero step by step. Each
+   !> solve starts from the solution before. If the first solve fails, the rise is made larger.
+   subroutine reduce_rise(self, system, goal, solved)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
       real(dp), intent(in) :: goal
@@ -142,7 +146,7 @@ contains
       last = 0.0_dp
       factor = first_factor
       call set_rise(system, self%begun, 1.0_dp)
-      do k = 1, most_descents
+      do k = 1, most_rises
          if (is_to_end(system)) exit
          call self%now%copy(self%begun)
          call iterate(self, system, goal, met)
@@ -162,7 +166,7 @@ contains
          if (system%rules%rise > most_rise .or. factor > last_factor) exit
       end do
       system%rules%rise = 0.0_dp
-   end subroutine descend
+   end subroutine reduce_rise
 
    !> Change the rise, and adjust s in cells with pressure so that their pressure does not change.
    subroutine set_rise(system, state, rise)
@@ -206,17 +210,17 @@ contains
       if (.not. found) return
 
       call system%renew(self%now)
-      call gather(self, self%now%left, v)
+      call gather(self, self%now%residual, v)
       v%cells = -v%cells
-      v%beside = -self%now%left_load
+      v%beside = -self%now%load_residual
       call system%improve(self%now, self%first, self%cell, v)
       call krylov%begin(v, self%first, most_directions, merge(self%far_accuracy, accuracy, self%now%worst > far))
       do while (krylov%unsolved())
          if (is_to_end(system)) exit
          call krylov%next(v)
          call change(self, system, v)
-         call gather(self, self%trial%left, v)
-         v%beside = self%trial%left_load
+         call gather(self, self%trial%residual, v)
+         v%beside = self%trial%load_residual
          call system%improve(self%now, self%first, self%cell, v)
          call krylov%take(v)
       end do
@@ -239,7 +243,7 @@ contains
       end do
    end subroutine list_cells
 
-   !> Compute the derivative of the equations along a vector of the unknowns, in `trial%left` of all cells.
+   !> Compute the derivative of the equations along a vector of the unknowns, in `trial%residual` of all cells.
    subroutine change(self, system, v)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
@@ -252,9 +256,9 @@ contains
       call system%evaluate(self%trial)
       !$omp parallel do default(none) shared(self, length) private(j)
       do j = 1, size(self%now%s, 2)
-         self%trial%left(:, :, j) = (self%trial%left(:, :, j) - self%now%left(:, :, j))/length
+         self%trial%residual(:, :, j) = (self%trial%residual(:, :, j) - self%now%residual(:, :, j))/length
       end do
-      self%trial%left_load = (self%trial%left_load - self%now%left_load)/length
+      self%trial%load_residual = (self%trial%load_residual - self%now%load_residual)/length
    end subroutine change
 
    !> Add a multiple of a vector to the present state, and store the result in `trial`.
@@ -302,7 +306,7 @@ contains
 
       call change(self, system, step)
       do j = 1, size(self%follow, 2)
-         self%follow(:, j) = -(self%now%left(:, 1, j) + self%trial%left(:, 1, j))*system%unit_length
+         self%follow(:, j) = -(self%now%residual(:, 1, j) + self%trial%residual(:, 1, j))*system%unit_length
          self%follow(self%cell(self%first(j):self%first(j + 1) - 1), j) = 0.0_dp
       end do
       self%best%merit = huge(1.0_dp)

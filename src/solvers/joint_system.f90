@@ -28,10 +28,10 @@ module joint_system
       real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
       real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
       real(dp) :: level = 0.0_dp                       !! m
-      real(dp), allocatable :: left(:, :, :)           !! residuals of the equations of a cell, scaled [nx, 3, rows]
-      real(dp) :: left_load = 0.0_dp                   !! residual of the load, scaled, times `root`
-      real(dp) :: merit = 0.0_dp                       !! root of the sum of squares
-      real(dp) :: worst = 0.0_dp                       !! largest
+      real(dp), allocatable :: residual(:, :, :)       !! of the equations of a cell, scaled [nx, 3, rows]
+      real(dp) :: load_residual = 0.0_dp               !! of the load, scaled, times `root`
+      real(dp) :: merit = 0.0_dp                       !! root of the sum of the squares of all residuals
+      real(dp) :: worst = 0.0_dp                       !! largest absolute residual
    contains
       procedure :: make_room
       procedure :: copy
@@ -74,7 +74,7 @@ contains
 
       allocate (self%s(grid%nx, grid%rows()), source=0.0_dp, stat=status)
       if (status == 0) allocate (self%t(grid%nx, 2, grid%rows()), source=0.0_dp, stat=status)
-      if (status == 0) allocate (self%left(grid%nx, 3, grid%rows()), source=0.0_dp, stat=status)
+      if (status == 0) allocate (self%residual(grid%nx, 3, grid%rows()), source=0.0_dp, stat=status)
    end subroutine make_room
 
    !> Copy another state to the existing fields.
@@ -84,9 +84,9 @@ contains
 
       self%s(:, :) = other%s
       self%t(:, :, :) = other%t
-      self%left(:, :, :) = other%left
+      self%residual(:, :, :) = other%residual
       self%level = other%level
-      self%left_load = other%left_load
+      self%load_residual = other%load_residual
       self%merit = other%merit
       self%worst = other%worst
    end subroutine copy

@@ -1,24 +1,24 @@
 !> Normal contact without adhesion: P >= 0, gap >= 0, P gap = 0.
 !>
-!> Bound-constrained, projected conjugate gradients for the pressure P under a rigid rough surface H,
+!> The method is projected conjugate gradients for the pressure P on a rigid rough surface H:
 !>     minimise  c/2 (P + P_h).A(P + P_h) - P.H,   P >= 0,   mean(P) given or the approach given,
-!> where A is the operator for unit shear modulus, c = 1/modulus, and P_h a given traction (the memory
-!> of a viscoelastic material; nothing else changes with it). After Polonsky and Keer (1999), with
+!> where A is the operator for a shear modulus of 1, c = 1/modulus, and P_h the traction of the past of a viscoelastic
+!> material, which is zero for an elastic one. The method is that of Polonsky and Keer (1999), with these differences:
 !> * the exact projection on {P >= 0, sum P = load} instead of a rescaling;
 !> * the direction kept through changes of the contact set (Fletcher-Reeves, and Polak-Ribiere where that loses the
 !>   conjugacy of the directions);
-!> * a preconditioner ~ |q| that consists of a local stencil and block means, for which the residual is extended
-!>   outside the contact (module `schur_preconditioner`);
-!> * the step length predicted on the block means, so that the clipped step s is known before the
-!>   transform: two transforms per iteration, always;
+!> * a preconditioner whose symbol is about |q|, with the wave number q; it consists of a local stencil and block means,
+!>   and the residual is extended outside the contact for it (module `schur_preconditioner`);
+!> * a prediction of the step length from the block means, so that the projected step s is known before the transform,
+!>   and an iteration always takes two transforms;
 !> * passes over active blocks of 16 cells only, except the one that updates the gap.
-!> The algorithm of the thesis (2.1.2) is in module `normal_cg_thesis`.
+!> The method of the thesis (2.1.2) is in module `normal_cg_thesis`.
 !>
 !> An iteration measures the error, chooses a direction d, projects P + alpha d on the admissible pressures, which
 !> gives a step s, and adds the multiple of s to P that minimises the energy. Module `normal_iteration` chooses the
 !> direction and the step.
 !>
-!> The solve has converged if the duality gap e1 = (mean gap under the pressure - least gap)/h_rms and the
+!> The solve has converged if the duality gap e1 = (mean gap weighted by the pressure - least gap)/h_rms and the
 !> error of the load are below the tolerance. If the contact is small on a tall
 !> map, a smaller scale than h_rms is used (`narrow_scale` of module `normal_state`).
 !>
@@ -27,10 +27,10 @@
 !> is computed again from the pressure in double precision, which always precedes the end of a solve in mixed
 !> precision, and when single precision is no longer useful.
 !>
-!> Fields of doubles: H, P, gap and step; three fields in single precision (the direction, the residual
-!> and the search direction of the preconditioner); the operator's spectrum, in whose memory lie two more
-!> fields of the preconditioner and, in mixed precision, the spectrum in single precision; a quarter for
-!> the operator's symbol (an eighth in mixed precision); 0.4 for blocks and the coarse level: 7.1. In free
+!> Memory, in fields of doubles: 7.1 in periodic mode. These are H, P, gap and step; three fields in single precision
+!> (the direction, the residual and the search direction of the preconditioner); the operator's spectrum, whose memory
+!> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
+!> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
 !> mode spectrum and symbol take three (three and a half in mixed precision).
 module normal_cg
    use contact_solver, only : contact_solver_type
@@ -41,7 +41,7 @@ module normal_cg
    use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
       phase_conjugate, phase_ended, phase_restart
    use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
-   use normal_state, only : combine_measures, evaluate_gap, first_pressure, gap_measure_type, hand_out, narrow_scale, &
+   use normal_state, only : combine_measures, evaluate_gap, first_pressure, gap_measure_type, return_solution, narrow_scale, &
       normal_problem_type, prepare_problem, reason_undetermined
    use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
@@ -73,7 +73,7 @@ contains
    subroutine new_normal_solver(self, grid, kernel, error, mixed)
       type(normal_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: mixed           !! in mixed precision
 
@@ -140,7 +140,7 @@ contains
          if (watch%single) product => self%quick
          call first_pressure(task, self%grid, product, height, pressure, past)
          if (task%warm .and. task%displaced) then
-            call take_gap()
+            call use_given_displacement()
          else
             call compute_gap()
          end if
@@ -186,30 +186,30 @@ contains
       !> Compute the gap by a product of the whole pressure, and measure it.
       subroutine compute_gap()
          call evaluate_gap(task, self%operator, height, pressure, gap, past)
-         call measure_it()
+         call measure_gap_now()
          call watch%note_fresh()
       end subroutine compute_gap
 
-      !> The gap from the displacement that was handed in, and its measure.
-      subroutine take_gap()
+      !> Compute the gap from the displacement that the caller has given, and measure it.
+      subroutine use_given_displacement()
          integer :: j
 
          !$omp parallel do default(none) shared(gap, height, task) private(j) num_threads(self%operator%threads)
          do j = 1, self%grid%rows()
             gap(:, j) = gap(:, j) + (task%datum - height(:, j))
          end do
-         call measure_it()
-      end subroutine take_gap
+         call measure_gap_now()
+      end subroutine use_given_displacement
 
-      !> The measure of the gap.
-      subroutine measure_it()
+      !> Measure the present gap.
+      subroutine measure_gap_now()
          type(state_sums_type) :: sums
 
          call survey(self%work, task%target, pressure, gap)
          sums = total(self%work%state)
          measure = combine_measures(task, cells, sums)
          if (watch%single) call self%quick%set_unit(sums%load/cells)
-      end subroutine measure_it
+      end subroutine measure_gap_now
 
       !> Measure the result with a new gap.
       subroutine finish_solve()
@@ -220,16 +220,17 @@ contains
             call compute_gap()
          end if
          outcome%reason = now%reason
-         call hand_out(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
+         call return_solution(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
          call reject_overflow(outcome, pressure, gap, self%operator%threads)
-         ! A little more, so that a half is not rounded by the round-off of what was counted before.
+         ! A transform of the coarse level counts as a fraction. The small addition keeps the round-off of earlier counts
+         ! from deciding how a half is rounded.
          outcome%ffts = nint(transforms(self) - before + 1e-6_dp, int64)
          outcome%seconds = omp_get_wtime() - began
       end subroutine finish_solve
 
    end subroutine solve
 
-   !> Transforms done so far, those of the coarse level by their share.
+   !> Transforms done so far. Those of the coarse level count by their number of cells.
    pure function transforms(self) result(count)
       type(normal_solver_type), intent(in) :: self
       real(dp) :: count
@@ -238,7 +239,7 @@ contains
          + self%work%preconditioner%transforms()
    end function transforms
 
-   !> One over the power of two above a length, or above another where that is 0.
+   !> The inverse of the power of two above a length, or above another length if the first one is 0.
    pure function unit_of(length, other) result(unit)
       real(dp), intent(in) :: length, other
       real(dp) :: unit

@@ -1,16 +1,16 @@
-!> Normal contact by the conjugate gradients of the thesis (2.1.2), with which its counts can be
+!> Normal contact by the conjugate gradients of the thesis (2.1.2), with which its numbers of iterations can be
 !> reproduced. An iteration takes three transforms.
 !>
-!> The quadratic form of the direction by Parseval (eq. 2.8) takes the first transform, and U = A P the others. The
-!> pressure is clipped and rescaled to the load; the contact is where P > 0 or the surfaces overlap.
-!> The stopping criterion is that of module normal_cg.
+!> The quadratic form of the direction by Parseval's theorem (eq. 2.8) takes the first transform, and U = A P the others.
+!> Negative pressures are set to 0, and the others are rescaled to the load. The contact is where P > 0 or the surfaces
+!> overlap. The stopping criterion is that of module `normal_cg`.
 module normal_cg_thesis
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
    use fft_conv, only : new_convolution
    use finite_fields, only : reject_overflow
    use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
-      hand_out, measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, &
+      return_solution, measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, &
       reason_undetermined
    use omp_lib, only : omp_get_wtime
    use field_sums, only : cell_count, row_total
@@ -36,7 +36,7 @@ contains
    subroutine new_thesis_solver(self, grid, kernel, error)
       type(thesis_solver_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
 
       self%grid = grid
@@ -87,22 +87,22 @@ contains
          call move(task, alpha, direction, pressure, outcome)
          if (outcome%reason /= reason_iterations) exit
       end do
-      call hand_out(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
+      call return_solution(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
       outcome%ffts = self%operator%ffts - before
       call reject_overflow(outcome, pressure, gap, self%operator%threads)
       outcome%seconds = omp_get_wtime() - began
 
    contains
 
-      !> The direction by Polak and Ribiere, and the length of the step along it.
+      !> Choose the direction of Polak and Ribiere, and the length of the step along it.
       subroutine choose_direction()
          real(dp) :: beta, slope, change
 
          call new_residual(task, measure%level, pressure, gap, residual, previous, slope, change)
          beta = 0.0_dp
          if (form > 0.0_dp) beta = max(change/(alpha*form), 0.0_dp)     ! eq. 2.7
-         call turn(beta, residual, direction, slope)
-         if (slope <= 0.0_dp) call turn(0.0_dp, residual, direction, slope)
+         call form_direction(beta, residual, direction, slope)
+         if (slope <= 0.0_dp) call form_direction(0.0_dp, residual, direction, slope)
          call self%operator%quadratic_form(direction, form)
          form = form/task%modulus
          if (slope <= 0.0_dp .or. form <= 0.0_dp) then
@@ -114,7 +114,7 @@ contains
 
    end subroutine solve
 
-   !> residual = H - U less its mean, on the contact; residual.(residual - previous).
+   !> Compute the residual H - U minus its mean on the contact, its square, and residual.(residual - previous).
    subroutine new_residual(problem, level, pressure, gap, residual, previous, slope, change)
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: level
@@ -151,8 +151,8 @@ contains
       change = row_total(rows(2, :))
    end subroutine new_residual
 
-   !> direction = residual + beta direction on the contact; its product with the residual.
-   subroutine turn(beta, residual, direction, slope)
+   !> Compute direction = residual + beta direction on the contact, and its product with the residual.
+   subroutine form_direction(beta, residual, direction, slope)
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: residual(:, :)
       real(dp), intent(inout) :: direction(:, :)
@@ -171,15 +171,15 @@ contains
          end do
       end do
       slope = row_total(rows)
-   end subroutine turn
+   end subroutine form_direction
 
-   !> P = P + alpha direction, clipped, and rescaled where the load is prescribed.
+   !> Compute P = P + alpha direction, set negative pressures to 0, and rescale the others if the load is prescribed.
    subroutine move(problem, alpha, direction, pressure, outcome)
       type(normal_problem_type), intent(in) :: problem
       real(dp), intent(in) :: alpha
       real(dp), intent(in) :: direction(:, :)
       real(dp), intent(inout) :: pressure(:, :)
-      type(solver_result_type), intent(inout) :: outcome   !! gets a reason if nothing is left loaded
+      type(solver_result_type), intent(inout) :: outcome   !! gets a reason if no cell has a pressure any more
       real(dp), allocatable :: rows(:)
       real(dp) :: factor, load
       integer :: j

@@ -7,11 +7,11 @@
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
-!>     restart    d = M r, the preconditioned residual: at first, and if the last direction is of no more use
-!>                (little was taken of a clipped step, the gap has drifted, or the step was plain)
-!>     conjugate  d = M r + beta d: after every other step
-!>     plain      d = r: after several steps that did not descend after they were projected. M r may point uphill
-!>                once it is projected; r never does.
+!>     restart    d = M r, the preconditioned residual: in the first iteration, and if the last direction is useless
+!>                because little was taken of a clipped step, the gap has drifted, or the step was plain
+!>     conjugate  d = M r + beta d: after all other steps
+!>     plain      d = r: after several steps along which the energy did not decrease once they were projected. A
+!>                projected step along M r may point uphill, but one along r never does
 !>     ended      the loop has ended
 module normal_iteration
    use asperity_precision, only : dp
@@ -32,23 +32,23 @@ module normal_iteration
    integer, parameter :: phase_plain = 3
    integer, parameter :: phase_ended = 4
 
-   ! kappa is the ratio of the true d.A d to the predicted one. A step that does not descend, or hardly descends,
-   ! makes kappa four times larger and thus the next trial shorter.
-   real(dp), parameter :: often_bent = 1e3_dp  !! kappa from which the direction is the plain residual
-   real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to descend
+   ! kappa is the ratio of the true d.A d to the predicted one. A step along which the energy does not decrease, or hardly
+   ! decreases, makes kappa four times larger and thus the next trial shorter.
+   real(dp), parameter :: often_shortened = 1e3_dp   !! kappa from which the direction is the plain residual
+   real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to reduce the energy
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
 
    ! Steps by which the preconditioner extends the residual. More steps save iterations only if many cells touch:
    ! the gaps between them are then narrow, and the coarse level does not resolve them.
    integer, parameter :: few_steps = 2, more_steps = 3, most_steps = 4
-   real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim pays,
-   real(dp), parameter :: much_contact = 0.3_dp   !! and from which more steps pay
-   real(dp), parameter :: large = 1.5e6_dp        !! cells from which they pay
+   real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim saves time
+   real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells in contact from which more steps save time
+   real(dp), parameter :: large = 1.5e6_dp        !! cells of a grid from which the far rim and most steps save time
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
-   real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which the mean needs more
+   real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which `shift_mean` is needed
 
    !> The numbers that an iteration passes to the next one.
    type :: iteration_type
@@ -72,7 +72,7 @@ contains
       now%reason = reason
    end subroutine end_loop
 
-   !> Does it pay to extend the residual to a wider rim around the contact?
+   !> Does it save time to extend the residual to a wider rim around the contact?
    pure logical function far_rim_pays(cells, contact)
       real(dp), intent(in) :: cells                    !! of the grid
       real(dp), intent(in) :: contact                  !! part of the cells
@@ -182,7 +182,8 @@ contains
       end if
    end subroutine choose_step
 
-   !> Make the next trial shorter, and in the end plain.
+   !> Make the next trial shorter. After many such calls the direction becomes the plain residual, and then the loop
+   !> ends.
    subroutine shorten(now)
       type(iteration_type), intent(inout) :: now
 
@@ -190,7 +191,7 @@ contains
          call end_loop(now, 'no step lowers the energy')
       else
          now%kappa = 4.0_dp*now%kappa
-         now%phase = merge(phase_plain, phase_restart, now%kappa > often_bent)
+         now%phase = merge(phase_plain, phase_restart, now%kappa > often_shortened)
       end if
    end subroutine shorten
 

@@ -1,8 +1,8 @@
-!> The passes of module normal_cg over the whole grid, row by row: the measure of a state, the direction, and the next
+!> The passes of module `normal_cg` over the whole grid, row by row: the measure of a state, the direction, and the next
 !> state. Those that form a step from the direction are in module `normal_projection`.
 !>
-!> They visit the active blocks only (module active_blocks), except the pass that updates the gap. The
-!> work fields are zero elsewhere. The innermost loops are in module normal_sweeps.
+!> They visit the active blocks only (module `active_blocks`), except the pass that updates the gap. The
+!> work fields are zero elsewhere. The innermost loops are in module `normal_sweeps`.
 module normal_passes
    use active_blocks, only : active_blocks_type, new_active_blocks
    use coarse_level, only : coarse_level_type, new_coarse_level
@@ -79,7 +79,7 @@ contains
       end do
    end subroutine survey
 
-   !> Product of z = M r with the residual before.
+   !> The product of z = M r with the residual before.
    function overlap_with(self, before) result(overlap)
       type(normal_work_type), intent(in), target :: self
       real(dp), intent(in) :: before(self%grid%nx, self%grid%rows())

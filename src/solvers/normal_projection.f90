@@ -70,7 +70,7 @@ contains
       sums = total(rows)
    end subroutine keep_block_sums
 
-   !> The same for a row of blocks. The numbers are found by Newton's method from below, as in `find_clip`.
+   !> Do the same for a row of blocks. The numbers are found by Newton's method from below, as in `find_clip`.
    subroutine keep_strip_sums(self, jb, step, rows)
       type(normal_work_type), intent(in) :: self
       integer, intent(in) :: jb                      !! row of blocks
@@ -101,8 +101,8 @@ contains
       end do
    end subroutine keep_strip_sums
 
-   !> Sums over the active cells of each block in a row of blocks: of the values, of their parts above a shift, and the
-   !> number of cells above it.
+   !> Form the sums over the active cells of each block in a row of blocks: of the values, of their parts above a shift,
+   !> and the number of cells above it.
    pure subroutine sum_strip(self, jb, values, shift, sums, above, cells)
       type(normal_work_type), intent(in) :: self
       integer, intent(in) :: jb                      !! row of blocks

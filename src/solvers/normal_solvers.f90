@@ -18,7 +18,7 @@ contains
       class(contact_solver_type), allocatable, intent(out) :: self
       character(*), intent(in) :: method               !! 'fast' or 'thesis'
       type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: mixed           !! steps in single precision; 'fast' only
       type(normal_solver_type), allocatable :: fast

@@ -10,7 +10,7 @@ module normal_state
    implicit none
    private
 
-   public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, hand_out, measure_gap, &
+   public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, return_solution, measure_gap, &
       narrow_scale, normal_problem_type, prepare_problem, row_measure
 
    character(*), parameter, public :: reason_converged = 'converged'
@@ -21,7 +21,7 @@ module normal_state
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
 
-   real(dp), parameter :: shallow = 10.0_dp             !! longest scale over the displacement under load
+   real(dp), parameter :: shallow = 10.0_dp             !! largest scale over the displacement under the load
 
    !> A normal contact problem without its fields.
    type :: normal_problem_type
@@ -30,33 +30,33 @@ module normal_state
       real(dp) :: target = 0.0_dp           !! mean pressure, Pa, or the level U - H, m
       real(dp) :: tolerance = 1e-6_dp       !! of the duality gap and of the load
       integer :: max_iterations = 1000
-      logical :: warm = .false.             !! the pressure handed in is a start
-      logical :: displaced = .false.        !! the gap handed in is the displacement U of that start
+      logical :: warm = .false.             !! the given pressure is a start
+      logical :: displaced = .false.        !! the given gap holds the displacement U of that start
       real(dp) :: rms_height = 0.0_dp       !! of H about its mean, m; 0: not known yet
       real(dp) :: datum = 0.0_dp            !! highest point of H; set here, m
-      real(dp) :: scale = 0.0_dp            !! height that the duality gap is solved to; set here, m
-      real(dp) :: least_scale = 0.0_dp      !! the least one that round-off allows; set here, m
+      real(dp) :: scale = 0.0_dp            !! height to which the duality gap is compared; set here, m
+      real(dp) :: least_scale = 0.0_dp      !! the least such height that round-off allows; set here, m
    end type normal_problem_type
 
    !> The distance of a state from the solution.
    type :: gap_measure_type
       real(dp) :: level = 0.0_dp            !! mean of U - H + datum over P > 0, or the prescribed one, m
-      real(dp) :: weighted_level = 0.0_dp   !! the same weighted by P, or the prescribed one, m
+      real(dp) :: weighted_level = 0.0_dp   !! mean of U - H + datum weighted by P, or the prescribed one, m
       real(dp) :: load = 0.0_dp             !! sum of P over the cells, Pa
       real(dp) :: contact = 0.0_dp          !! part of the cells with P > 0
       real(dp) :: load_error = 0.0_dp       !! relative
       real(dp) :: duality_gap = 0.0_dp      !! mean of U - H weighted by P above its least, m
       real(dp) :: error = 0.0_dp            !! e1: duality gap over the rms height, or the load error
-      real(dp) :: strict = 0.0_dp           !! the same, the gap over the problem's scale
+      real(dp) :: strict = 0.0_dp           !! duality gap over the problem's scale, or the load error
    end type gap_measure_type
 
 contains
 
-   !> Complete a problem for its fields: find a height to which errors are compared and that round-off resolves
-   !> (for a flat surface, the displacement under the load), and whether the pressure is determined: in periodic
-   !> mode no approach may close the mean gap.
+   !> Complete a problem for its fields. Find a height to which errors are compared and that round-off resolves (for a
+   !> flat surface, the displacement under the load). Find out whether the pressure is determined: it is not if the
+   !> prescribed approach leaves no mean gap in periodic mode.
    !>
-   !> The solvers count heights, gaps and levels from the highest point of the map. Under a small load all touching
+   !> The solvers measure heights, gaps and levels from the highest point of the map. Under a small load all touching
    !> cells lie near that point, so that these differences are exact, and the gap is not the small difference of two
    !> large numbers.
    subroutine prepare_problem(problem, grid, threads, height, task, determined)
@@ -225,7 +225,7 @@ contains
       measure = combine_measures(problem, cell_count(gap), total(rows))
    end function measure_gap
 
-   !> gap = A(P + P_h)/modulus - H, H counted from the datum.
+   !> Compute gap = A(P + P_h)/modulus - H, with H measured from the datum.
    subroutine evaluate_gap(problem, operator, height, pressure, gap, past)
       type(normal_problem_type), intent(in) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -332,8 +332,8 @@ contains
       end do
    end subroutine rescale
 
-   !> Return a solution: the outcome according to its measure, and the gap counted from the level.
-   subroutine hand_out(problem, task, measure, determined, threads, gap, level, outcome)
+   !> Return a solution: the outcome according to its measure, and the gap measured from the level.
+   subroutine return_solution(problem, task, measure, determined, threads, gap, level, outcome)
       type(normal_problem_type), intent(in) :: problem      !! as the caller gave it
       type(normal_problem_type), intent(in) :: task         !! the problem, completed for its fields
       type(gap_measure_type), intent(in) :: measure
@@ -354,6 +354,6 @@ contains
       end do
       level = measure%weighted_level - task%datum
       if (problem%control /= control_pressure) level = problem%target
-   end subroutine hand_out
+   end subroutine return_solution
 
 end module normal_state

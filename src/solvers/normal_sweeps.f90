@@ -173,7 +173,7 @@ contains
       sums%square = sums%square + square
    end subroutine clip_cells
 
-   !> The longest multiple of the step for which no pressure becomes negative, if it is less than `longest`.
+   !> Reduce `longest` to the longest multiple of the step for which no pressure becomes negative.
    pure subroutine longest_cells(n, pressure, step, longest)
       integer, intent(in) :: n
       real(dp), intent(in) :: pressure(n), step(n)
@@ -185,7 +185,7 @@ contains
       end do
    end subroutine longest_cells
 
-   !> 1 where x > 0, else 0, without a branch.
+   !> 1 if x > 0 and 0 otherwise, without a branch.
    elemental function positive(x)
       real(dp), intent(in) :: x
       real(dp) :: positive
@@ -193,7 +193,7 @@ contains
       positive = 0.5_dp - sign(0.5_dp, 0.0_dp - x)
    end function positive
 
-   !> 1 where the direction is not 0, else 0, without a branch.
+   !> 1 if the direction is not 0 and 0 otherwise, without a branch.
    elemental function acts(direction)
       real(sp), intent(in) :: direction
       real(sp) :: acts

@@ -41,7 +41,7 @@ module schur_blocks
       procedure :: shift_mean
       procedure :: start
       procedure :: weigh
-      procedure :: turn
+      procedure :: form_direction
       procedure :: response_parts
       procedure :: advance
       procedure :: transforms
@@ -144,7 +144,7 @@ contains
    end subroutine weigh
 
    !> Compute the next search direction and the coarse part of its response. Collective.
-   subroutine turn(self, coarse, beta)
+   subroutine form_direction(self, coarse, beta)
       class(schur_blocks_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
       real(dp), intent(in) :: beta                       !! multiple of the old direction
@@ -156,7 +156,7 @@ contains
             + beta*self%search_off(:, j)
       end do
       call self%model%add_missing(1.0_dp, self%search_off, self%addition)
-   end subroutine turn
+   end subroutine form_direction
 
    !> Compute the contribution of the coarse part of the response to the sums. From here on b includes the step
    !> before. Collective.

@@ -1,4 +1,4 @@
-!> The coarse part of the local model that module schur_preconditioner uses.
+!> The coarse part of the local model that module `schur_preconditioner` uses.
 !>
 !> The model of the inverse operator B ~ |q| (wave numbers per cell) is a stencil of symbol
 !>     c0 + c1 (4 - 2 cos kx - 2 cos ky),
@@ -171,7 +171,7 @@ contains
       end do
    end subroutine set_weights
 
-   !> The coarse part of W p, from the sums of p over the cells of N in the blocks. Collective.
+   !> Compute the coarse part of W p from the sums of p over the cells of N in the blocks. Collective.
    subroutine weigh(self, factor, sums, correction)
       class(schur_coarse_type), intent(inout) :: self
       real(dp), intent(in) :: factor

@@ -47,7 +47,7 @@ module schur_passes
 
 contains
 
-   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it.
+   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K.
    subroutine residual_pass(self, coarse, active, scale, level, pressure, gap, before)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
@@ -100,7 +100,7 @@ contains
       self%sums = image_sums_type(totals(1), totals(2))
    end subroutine residual_pass
 
-   !> K of the residual in some rows of a block.
+   !> Compute the image of the residual by K in some rows of a block.
    subroutine image_rows(self, coarse, active, jb, which, rows)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -126,7 +126,7 @@ contains
       call add_blocks(coarse, count, self%blocks%cells_off(:, jb))
    end subroutine image_rows
 
-   !> The pass of a step: add the step before to the image, form the direction and its response.
+   !> Do the pass of a step: add the step before to the image, and form the direction and its response.
    subroutine search_pass(self, coarse, active, step, sums)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -162,7 +162,7 @@ contains
       sums = response_sums_type(totals(1), totals(2), totals(3))
    end subroutine search_pass
 
-   !> The image and the search direction in the rows of a block.
+   !> Compute the image and the search direction in the rows of a block.
    subroutine search_rows(self, coarse, active, jb, step)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -193,7 +193,7 @@ contains
       end do
    end subroutine search_rows
 
-   !> K of the search direction in some rows of a block.
+   !> Compute the response to the search direction in some rows of a block.
    subroutine response_rows(self, coarse, active, jb, which, last, rows)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse

@@ -3,16 +3,16 @@
 !>
 !> On a fixed contact set S the matrix of the problem is A_SS. Its inverse is
 !>     B_SS - B_SN B_NN^-1 B_NS,
-!> the Schur complement of B = A^-1 ~ |q|, where N are the cells off the contact. So M r is found in two
-!> steps: choose v = r on S, and on N so that v.B v is least; then M r = B v on S. With v = 0 on N
-!> instead, M r = B_SS r fits worse the more edges the contact has.
+!> the Schur complement of B = A^-1, whose symbol is about |q|, with the wave number q; N are the cells outside the
+!> contact. M r is therefore found in two steps: set v = r on S, and choose v on N such that v.B v is least; then
+!> M r = B v on S. With v = 0 on N, M r = B_SS r would be the less accurate, the more edges the contact has.
 !>
 !> B is modelled by a stencil and a coarse level, B v = K v + R^T missing R v, with block sums R (module
-!> schur_coarse). If the model fits |q| within a factor, the Schur complements fit within the same
+!> `schur_coarse`). If the model fits |q| within a factor, the Schur complements fit within the same
 !> factor on any set S, so that the number of iterations hardly depends on the grid and the load.
 !>
-!> The minimum over N is approximated by a few steps of conjugate gradients, preconditioned by a constant
-!> and a coarse part, W p = om p + coarse part. A step needs one pass over the cells (module `schur_passes`). The pass
+!> The minimum over N is approximated by a few steps of conjugate gradients with the preconditioner W, which is a
+!> constant and a coarse part: W p = om p + coarse part. A step needs one pass over the cells (module `schur_passes`). The pass
 !> adds the step before to the image b = B v, and forms the search direction d and its response e = K d. The other
 !> sums that conjugate gradients need follow from block sums, because coarse parts are constant in a
 !> block (module `schur_blocks`). The caller adds the contribution of the last step to b:
@@ -26,8 +26,8 @@
 !> the iterations. For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
-!> rim around the contact (the wide blocks of module active_blocks). Memory: four such fields, of which two may be
-!> lent by others.
+!> rim around the contact (the wide blocks of module `active_blocks`). Memory: four such fields, of which two may use
+!> memory that the caller lends.
 module schur_preconditioner
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
    use active_blocks, only : active_blocks_type
@@ -46,8 +46,8 @@ module schur_preconditioner
 
    public :: new_schur_preconditioner, schur_preconditioner_type
 
-   real(dp), parameter :: c0_extended = 0.7_dp !! of the stencil
-   real(dp), parameter :: c0_plain = 1.0_dp    !! the same without an extension
+   real(dp), parameter :: c0_extended = 0.7_dp !! constant of the stencil (module `schur_coarse`)
+   real(dp), parameter :: c0_plain = 1.0_dp    !! the same if the residual is not extended
    real(dp), parameter :: least_cells = 131072.0_dp   !! cells from which the extension saves time ...
    real(dp), parameter :: least_oblong = 4096.0_dp    !! ... if they are oblong
    real(dp), parameter :: oblong = 2.0_dp             !! aspect of an oblong cell
@@ -108,8 +108,8 @@ contains
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
 
-   !> The residual scale (level - gap) on S = {P > 0 or gap < level}, its block means, and K of it. The residual before
-   !> is kept, except if M r comes from `waves`.
+   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K. The
+   !> residual before is kept, except if M r comes from `waves`.
    subroutine set_residual(self, coarse, active, scale, level, pressure, gap, before)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
@@ -161,7 +161,7 @@ contains
          step%last = k == steps
          if (k > 1) step%beta = real(product/before, sp)
          before = product
-         call self%blocks%turn(coarse, real(step%beta, dp))
+         call self%blocks%form_direction(coarse, real(step%beta, dp))
          call search_pass(self, coarse, active, step, sums)
          self%length = 0.0_sp
          call self%blocks%response_parts(coarse, parts%form, parts%cross, parts%square)

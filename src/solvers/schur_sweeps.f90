@@ -1,4 +1,4 @@
-!> The innermost loops of module schur_preconditioner over neighbouring cells of one row, in single
+!> The innermost loops of module `schur_preconditioner` over neighbouring cells of one row, in single
 !> precision.
 !>
 !> Each is one loop without branches, so that it runs in vector registers. A cell is in the contact set
@@ -27,7 +27,7 @@ module schur_sweeps
 
 contains
 
-   !> image = K residual, with its sums on N.
+   !> Compute image = K residual, with its sums on N.
    pure subroutine image_cells(n, weights, south, residual, north, image, column, count, sums)
       integer, intent(in) :: n
       real(sp), intent(in) :: weights(3)            !! of the stencil: centre, along x, along y
@@ -59,7 +59,7 @@ contains
       sums%square = sums%square + square
    end subroutine image_cells
 
-   !> image = image + coarse part; search = correction - diagonal image on N, 0 on S.
+   !> Compute image = image + coarse part, and search = correction - diagonal image on N, 0 on S.
    pure subroutine start_search_cells(n, diagonal, coarse, correction, residual, image, search)
       integer, intent(in) :: n
       real(sp), intent(in) :: diagonal
@@ -99,7 +99,7 @@ contains
       end do
    end subroutine search_cells
 
-   !> response = K search, with the sums on N.
+   !> Compute response = K search, with the sums on N.
    pure subroutine response_cells(n, weights, south, search, north, residual, image, response, column, &
       sums)
       integer, intent(in) :: n
@@ -133,7 +133,7 @@ contains
       sums%square = sums%square + square
    end subroutine response_cells
 
-   !> The same for the last step, of which only d e is needed.
+   !> Do the same for the last step, of which only the sum d e is needed.
    pure subroutine last_response_cells(n, weights, south, search, north, response, sums)
       integer, intent(in) :: n
       real(sp), intent(in) :: weights(3)

@@ -302,19 +302,19 @@ contains
          do i = 1, self%grid%nx
             if (self%rules%law%slope) slope = [contact%slope_x(i, j), contact%slope_y(i, j)]
             share = self%rules%share_of(self%width(i, j), state%s(i, j))
-            state%left(i, 1, j) = (contact%gap(i, j) - contact%height(i, j) - state%level &
+            state%residual(i, 1, j) = (contact%gap(i, j) - contact%height(i, j) - state%level &
                - self%rules%gap_of(state%s(i, j)))/self%unit_length
-            state%left(i, 2:3, j) = self%rules%lacking(share, contact%pressure(i, j), slope, &
+            state%residual(i, 2:3, j) = self%rules%traction_error(share, contact%pressure(i, j), slope, &
                stretch*contact%slip(i, :, j), state%t(i, :, j))/self%unit_traction
          end do
-         rows(:, j) = [sum(state%left(:, :, j)**2), sum(contact%pressure(:, j))]
-         largest(j) = maxval(abs(state%left(:, :, j)))
+         rows(:, j) = [sum(state%residual(:, :, j)**2), sum(contact%pressure(:, j))]
+         largest(j) = maxval(abs(state%residual(:, :, j)))
       end do
       sums = row_totals(rows)
-      state%left_load = (sums(2)/self%grid%cells() - self%target)/self%unit_pressure
-      state%worst = max(largest_of_rows(largest), abs(state%left_load))
-      state%left_load = state%left_load*self%root
-      state%merit = sqrt(sums(1) + state%left_load**2)
+      state%load_residual = (sums(2)/self%grid%cells() - self%target)/self%unit_pressure
+      state%worst = max(largest_of_rows(largest), abs(state%load_residual))
+      state%load_residual = state%load_residual*self%root
+      state%merit = sqrt(sums(1) + state%load_residual**2)
    end subroutine compare
 
    !> Prepare the approximate inverse for the cells that carry pressure in a state.
@@ -366,7 +366,7 @@ contains
          call judge_gap(contact, system%operator, task, outcome%normal)
          allocate (rows(2, system%grid%rows()))
          do j = 1, system%grid%rows()
-            rows(1, j) = sum((found%left(:, 2:3, j)*system%unit_traction)**2)
+            rows(1, j) = sum((found%residual(:, 2:3, j)*system%unit_traction)**2)
             rows(2, j) = sum(contact%traction(:, :, j)**2)
          end do
          sums = row_totals(rows)

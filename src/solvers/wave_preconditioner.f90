@@ -1,9 +1,9 @@
 !> The preconditioner of the normal solver for very oblong cells.
 !>
 !> On a fixed contact set S the inverse of the matrix A_SS is the Schur complement of B = A^-1 (module
-!> `schur_preconditioner`). For very oblong cells no stencil fits B: along the short side of a cell the wave numbers of
-!> the grid are many times larger than along the long side. B is therefore applied as what it is, a convolution, in
-!> single precision and at the cost of two transforms of the whole grid.
+!> `schur_preconditioner`). For very oblong cells no stencil fits B, because the wave numbers of the grid along the short
+!> side of a cell are many times larger than along the long side. B is therefore applied as a convolution, in single
+!> precision and at the cost of two transforms of the whole grid.
 !>
 !> The residual must also be extended to the cells N off the contact. With 0 on N, it would have a step at each edge
 !> of the contact, whose short waves B multiplies by much more than the means of the rows. But these means matter:
@@ -17,8 +17,8 @@
 !>
 !> For the same reason the solver keeps the sums of the blocks when it makes negative trial pressures 0
 !> (`keep_block_sums` of module `normal_projection`). The contact changes in almost every iteration, and the factor
-!> of Fletcher and Reeves would then keep directions that are of no use any more. The one of Polak and Ribiere
-!> forgets them; it needs the residual before, which is kept in the field of the search direction.
+!> of Fletcher and Reeves would then keep directions that have become useless. The factor of Polak and Ribiere
+!> forgets them. It needs the residual before, which is kept in the field of the search direction.
 !>
 !> Memory: half a field for the spectrum and an eighth for the symbol.
 module wave_preconditioner
@@ -81,12 +81,12 @@ contains
          /[coarse%kernel%compliance(pi/max(grid%lx, grid%ly)), coarse%kernel%compliance(pi/min(grid%lx, grid%ly))]
    end subroutine new_wave_preconditioner
 
-   !> The stiffness of the solid for the waves of a periodic grid, relative to that for a wave of the length h, and 0 for
+   !> Compute the stiffness of the solid for the waves of a periodic grid, relative to that for a wave of the length h, and 0 for
    !> the mean.
    pure subroutine stiffness_symbols(grid, h, kernel, first, symbol)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: h                        !! side of a square cell of the same area, m
-      type(kernel_type), intent(in) :: kernel          !! what the solid is, normal
+      type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       integer, intent(in) :: first                     !! wave number along x of the first column
       real(dp), intent(out) :: symbol(first:, 0:)
       real(dp) :: reference, a(3)
@@ -228,7 +228,7 @@ contains
       end do
    end subroutine extend_strip
 
-   !> The image in a row of blocks, its part from N, and the products of both with the residuals in each row.
+   !> Compute the image in a row of blocks, its part from N, and the products of both with the residuals in each row.
    subroutine image_strip(self, coarse, jb, residual, before, image, pending, rows)
       type(wave_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse

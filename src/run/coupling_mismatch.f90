@@ -1,0 +1,72 @@
+!> The error of a pass of a row with friction: the difference between the road at the displacement U_T that the pass has
+!> found, and the road on which it was solved.
+!>
+!> It is the larger of two means that are weighted by the pressure: the difference of the heights divided by the rms
+!> height of the map, and that of the slopes divided by the slopes in the contact. With constant shear a cell with hardly
+!> any pressure carries as much traction as any other, and these means do not show whether it obeys the law. In that case
+!> the sum of the errors of all cells (module `edge_shares`) counts as well.
+!>
+!> Memory: three fields, which are borrowed from the workspace of the contact.
+module coupling_mismatch
+   use asperity_interpolation, only : displaced
+   use asperity_precision, only : dp
+   use asperity_schedule, only : planned_row_type
+   use contact_model, only : contact_type
+   use edge_shares, only : edge_rule_type
+   use field_sums, only : row_totals
+   implicit none
+   private
+
+   public :: mismatch_of
+
+   !> Slopes in the contact count as at least this part of the rms slope of the map.
+   real(dp), parameter :: least_slope = 0.1_dp
+
+contains
+
+   !> The mismatch that a pass leaves. Without any pressure it is 0, or the error of the shares.
+   function mismatch_of(contact, plan, sharing, edge) result(mismatch)
+      class(contact_type), intent(inout) :: contact    !! after the tangential solve of the pass
+      type(planned_row_type), intent(in) :: plan
+      logical, intent(in) :: sharing                   !! the shares of the cells are unknown, too
+      type(edge_rule_type), intent(in) :: edge         !! the rule by which they change; used with `sharing` only
+      real(dp) :: mismatch
+      real(dp), pointer, contiguous :: height(:, :), slope_x(:, :), slope_y(:, :)     ! of the road at U_T
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: sums(4), edges
+      integer :: j
+
+      call contact%work%lend('height at U_T', height)
+      call contact%work%lend('slope along x at U_T', slope_x)
+      call contact%work%lend('slope along y at U_T', slope_y)
+      call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
+         contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
+      allocate (rows(4, contact%grid%rows()))
+      !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
+      do j = 1, contact%grid%rows()
+         rows(1, j) = sum(abs(contact%state%pressure(:, j)))
+         rows(2, j) = sum(abs(contact%state%pressure(:, j)*(height(:, j) - contact%height(:, j))))
+         rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(slope_x(:, j) - contact%slope_x(:, j), &
+            slope_y(:, j) - contact%slope_y(:, j)))
+         rows(4, j) = sum(abs(contact%state%pressure(:, j))*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
+      end do
+      sums = row_totals(rows)
+      edges = 0.0_dp
+      if (sharing) then
+         ! From here on `height` holds the gap over the road at U_T.
+         !$omp parallel do default(none) shared(contact, height) private(j)
+         do j = 1, contact%grid%rows()
+            height(:, j) = contact%state%gap(:, j) + contact%height(:, j) - height(:, j)
+         end do
+         edges = edge%error(contact%tangential%share, contact%state%pressure, height)
+      end if
+      call contact%work%take_back(height)
+      call contact%work%take_back(slope_x)
+      call contact%work%take_back(slope_y)
+      mismatch = edges
+      if (.not. sums(1) > 0.0_dp) return
+      mismatch = max(mismatch, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
+         sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))
+   end function mismatch_of
+
+end module coupling_mismatch
