@@ -7,11 +7,13 @@ module test_steady
    use asperity_interpolation, only : interpolation_type, new_interpolation
    use asperity_threads, only : set_threads, thread_count
    use asperity_precision, only : dp, pi
+   use friction_law, only : new_friction_law
    use prony, only : complex_modulus
    use asperity_schedule, only : planned_row_type
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
    use solver_result, only : solver_result_type
+   use steady_contact, only : explain, sliding_outcome_type, steady_contact_type
    use steady_step, only : new_steady_step, steady_step_type
    use asperity_surface, only : new_height
    use text_tools, only : exact_text, to_text
@@ -52,7 +54,25 @@ contains
       if (selected('constant_shear_at_the_edge')) call constant_shear_at_the_edge()
       if (selected('slow_contact_is_finished_by_newton')) call slow_contact_is_finished_by_newton()
       if (selected('stalled_rounds_are_solved_at_once')) call stalled_rounds_are_solved_at_once()
+      if (selected('reasons_are_complete')) call reasons_are_complete()
    end subroutine run_steady
+
+   !> The reasons why there may be no solution fit into the record of an outcome.
+   subroutine reasons_are_complete()
+      type(steady_contact_type) :: contact
+      type(sliding_outcome_type) :: outcome
+
+      call explain(contact, new_friction_law('constant_shear', 0.0_dp, 1e5_dp, 0.0_dp, .true., .true.), outcome)
+      call check_that(index(outcome%rubbing%reason, '''coulomb_orowan''') > 0, 'the advice is complete: '// &
+         trim(outcome%rubbing%reason))
+
+      contact%pressure = reshape([1e5_dp], [1, 1])
+      contact%slope_x = reshape([2.0_dp], [1, 1])
+      contact%slope_y = reshape([0.0_dp], [1, 1])
+      call explain(contact, new_friction_law('coulomb', 1.0_dp, 0.0_dp, 0.0_dp, .true., .true.), outcome)
+      call check_that(index(outcome%rubbing%reason, '1/coefficient') > 0, 'the reason is complete: '// &
+         trim(outcome%rubbing%reason))
+   end subroutine reasons_are_complete
 
    !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
    subroutine full_contact_with_a_wave()

@@ -1,10 +1,9 @@
 !> Warns if the contact comes near the edge of a free map.
 !>
-!> Outside the given map the road has its lowest height, and points that move off the map are lost. This is
-!> correct as long as the points at the edge lie well below the contact: by a tenth of the displacement of the
-!> rubber under the load, and, with adhesion, by several ranges of the attraction. (A tenth of the rms height is
-!> sufficient as well, except on a long map over which a summit travels, whose rms height is not related to the
-!> contact.)
+!> Outside the given map the road has its lowest height, and points that move off the map are lost. This has no effect
+!> as long as the points at the edge lie well below the contact: by a tenth of the displacement of the rubber under the
+!> load, and, with adhesion, by several ranges of the attraction. A tenth of the rms height is usually sufficient as
+!> well, but not on a long map over which a summit travels, because its rms height is not related to the contact.
 module map_edge
    use contact_rule, only : touches
    use asperity_precision, only : dp

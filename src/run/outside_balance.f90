@@ -2,7 +2,7 @@
 !>
 !>    work_load + work_drive = work_normal + work_tangential + energy_radiated + work_missing
 !>
-!> The load and the force of the drive are known at the ends of a step, and their work is computed by the
+!> The load and the force of the drive are known at both ends of a step, and their work is computed by the
 !> trapezoidal rule. The part of the friction force that accelerates the mass of the block does not reach the
 !> drive at the top of the block. The works on the right side are computed from the fields (modules
 !> `viscoelastic_energy` and `tangential_state`), whose own balance closes exactly. The two sides have only the

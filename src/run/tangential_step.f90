@@ -152,7 +152,7 @@ contains
       end if
    end subroutine begin
 
-   !> Set the pull of the road in the solver. The part of the pull that T does not balance acts on the slopes of the road:
+   !> Set the pull of the road in the solver. The part of the pull that T does not balance acts on slopes of the road:
    !> on all slopes if `slope_effect` is off, otherwise only on those outside the contact, through the attraction.
    subroutine set_pull(self, state, pressure, slope_x, slope_y)
       type(tangential_step_type), intent(inout) :: self

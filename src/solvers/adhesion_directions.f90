@@ -81,7 +81,7 @@ contains
       !$omp end do
       !$omp end parallel
       sums = sum_of(rows, self%patch%sharing)
-      ! Cells in contact that the mean would close are left out. This changes the mean, so repeat the pass.
+      ! Cells in contact that z minus its mean would close do not move. This changes the mean, so the pass is repeated.
       do pass = first + 1, last_pass
          mean = sums%total/max(sums%moving, 1.0_dp)
          !$omp parallel do default(none) shared(self, now, pass, mean, rows) private(j) &

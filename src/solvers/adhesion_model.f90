@@ -358,7 +358,7 @@ contains
       end do
    end subroutine interpolate
 
-   !> Transforms done so far, in units of a transform of the full grid.
+   !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)
       class(adhesion_model_type), intent(in) :: self
       real(dp) :: count

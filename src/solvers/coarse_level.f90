@@ -173,7 +173,7 @@ contains
       form = self%cells*form + max(squares - self%cells*total(1), 0.0_dp)*self%fine_symbol
    end function predict_form
 
-   !> Transforms done on this level, counted as those of the full grid.
+   !> Transforms done so far on this level, in units of a transform of the whole grid.
    pure function transforms(self) result(count)
       class(coarse_level_type), intent(in) :: self
       real(dp) :: count

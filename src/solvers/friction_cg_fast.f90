@@ -16,10 +16,10 @@
 !> its bound and now sticks, after a shortened step, and if the former d is not a direction of descent.
 !>
 !> In words: the preconditioner computes from g, the slip that should vanish, the change of traction z that would remove
-!> it if each point kept its state. `form_direction` adds a part of the last direction. `take_step` moves along d by the length
-!> that the quadratic model gives, and returns every point that is now outside its bound to it. This changes states: a
-!> point that was returned counts as slipping, and a slipping point whose slip has turned against its traction as
-!> sticking. The slip of the new traction is then computed with A, and module `friction_problem` forms g of it for the
+!> it if each point kept its state. `form_direction` adds a part of the last direction. `take_step` moves along d by the
+!> length that the quadratic model gives, and returns every point that is now outside its bound to it. This changes
+!> states: a point that was returned counts as slipping, and a slipping point whose slip has turned against its traction
+!> as sticking. The slip of the new traction is then computed with A, and module `friction_problem` forms g of it for the
 !> next iteration. The loop ends when g is small at all points, because the guess of the states is then right.
 !>
 !> If many points are returned to their bounds, the total traction changes, and a mean mode with a large compliance

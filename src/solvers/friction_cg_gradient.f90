@@ -1,6 +1,6 @@
 !> The fallback for the tangential problem: spectral projected gradients.
 !>
-!>     T' = return(T + alpha r)       r: the slip along the slope; return: radially to the bound, if T + alpha r is outside
+!>     T' = return(T + alpha r)       r: the slip along the slope; return: radially to the bound, if outside it
 !>     alpha = s.s/s.y or s.y/y.y     s = T' - T, y = r - r' (Barzilai and Borwein, 1988); the second one, which is
 !>                                    shorter, if it is less than half of the first one
 !>

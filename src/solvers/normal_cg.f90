@@ -41,8 +41,8 @@ module normal_cg
    use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
       phase_conjugate, phase_ended, phase_restart
    use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
-   use normal_state, only : combine_measures, evaluate_gap, first_pressure, gap_measure_type, return_solution, narrow_scale, &
-      normal_problem_type, prepare_problem, reason_undetermined
+   use normal_state, only : combine_measures, evaluate_gap, first_pressure, gap_measure_type, narrow_scale, &
+      normal_problem_type, prepare_problem, reason_undetermined, return_solution
    use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type

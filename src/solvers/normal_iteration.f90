@@ -32,8 +32,8 @@ module normal_iteration
    integer, parameter :: phase_plain = 3
    integer, parameter :: phase_ended = 4
 
-   ! kappa is the ratio of the true d.A d to the predicted one. A step along which the energy does not decrease, or hardly
-   ! decreases, makes kappa four times larger and thus the next trial shorter.
+   ! kappa is the ratio of the true d.A d to the predicted one. A step along which the energy does not decrease, or
+   ! hardly decreases, makes kappa four times larger and thus the next trial shorter.
    real(dp), parameter :: often_shortened = 1e3_dp   !! kappa from which the direction is the plain residual
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to reduce the energy
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little

@@ -68,7 +68,7 @@ contains
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(inout) :: direction(n)
       real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
-      real(sp), intent(inout) :: shares(n)          !! the same of 1 where it acts
+      real(sp), intent(inout) :: shares(n)          !! numbers of cells where it acts, over the rows of a block
       type(direction_sums_type), intent(inout) :: sums
       ! Other passes assume that d acts where it is not 0, so it must not be 0 where it acts.
       real(sp), parameter :: least = tiny(1.0_sp)

@@ -19,7 +19,7 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
-   !> Compliance of an open cell among cells in contact, in the units of the model.
+   !> Compliance of an open cell that is surrounded by cells in contact, in the units of the model.
    real(dp), parameter :: of_open_cell = 1.0_dp
 
    integer, parameter :: small = 16384         !! blocks below which one thread is faster
@@ -198,7 +198,7 @@ contains
       end do
    end subroutine advance
 
-   !> Transforms done so far, counted as those of the whole grid.
+   !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)
       class(schur_blocks_type), intent(in) :: self
       real(dp) :: count

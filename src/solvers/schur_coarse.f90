@@ -6,7 +6,7 @@
 !> block means (module `coarse_level`). With c0 = 0.7 the sum of both fits |q| within a factor of 1.8. (With
 !> c0 = 1 the factor is 2.1, but this is better if the residual is not extended.)
 !>
-!> The same grid holds the coarse part of W, an approximate inverse of the model on the cells N off the
+!> The same grid holds the coarse part of W, an approximate inverse of the model on the cells N outside the
 !> contact:
 !>     w IFFT( symbol FFT( w R p ) ),   w = (share of N in the block)^0.3,   symbol = 1/(B + shift) - om.
 !> The shift grows with the part of the grid that is not in N: the coarse functions are cut off there,
@@ -192,7 +192,7 @@ contains
       self%products = self%products + 1
    end subroutine weigh
 
-   !> Transforms done so far, counted as those of the whole grid.
+   !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)
       class(schur_coarse_type), intent(in) :: self
       real(dp) :: count

@@ -2,11 +2,11 @@
 !>
 !> The first pass forms the residual r on the contact S and its image b = K r, where K is the stencil. The pass of each
 !> step of conjugate gradients adds the step before to the image, and forms the next search direction d on N, the cells
-!> off the contact, and its response e = K d. The passes return sums over the cells, and leave the sums of each block in
-!> `blocks`. The innermost loops are in module `schur_sweeps`.
+!> outside the contact, and its response e = K d. The passes return sums over the cells, and store the sums of each block
+!> in `blocks`. The innermost loops are in module `schur_sweeps`.
 !>
-!> Rows of a block whose neighbours belong to the same block follow at once; those at its edges follow after all blocks,
-!> because they read rows that another thread or process forms.
+!> The stencil is applied first to the rows whose neighbours belong to the same block. The rows at the edges of a block
+!> follow after all blocks, because they read rows that another thread or process forms.
 module schur_passes
    use active_blocks, only : active_blocks_type
    use asperity_precision, only : dp, sp

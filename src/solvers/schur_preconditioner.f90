@@ -12,7 +12,7 @@
 !> factor on any set S, so that the number of iterations hardly depends on the grid and the load.
 !>
 !> The minimum over N is approximated by a few steps of conjugate gradients with the preconditioner W, which is a
-!> constant and a coarse part: W p = om p + coarse part. A step needs one pass over the cells (module `schur_passes`). The pass
+!> constant and a coarse part: W p = om p + coarse part. A step needs one pass over the cells (module `schur_passes`). It
 !> adds the step before to the image b = B v, and forms the search direction d and its response e = K d. The other
 !> sums that conjugate gradients need follow from block sums, because coarse parts are constant in a
 !> block (module `schur_blocks`). The caller adds the contribution of the last step to b:
@@ -177,7 +177,7 @@ contains
       end do
    end subroutine extend
 
-   !> Transforms done so far, counted as those of the whole grid.
+   !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)
       class(schur_preconditioner_type), intent(in) :: self
       real(dp) :: count

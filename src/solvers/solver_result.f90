@@ -14,7 +14,7 @@ module solver_result
       real(dp) :: load_error = 0.0_dp           !! relative error of the prescribed load
       logical :: converged = .false.            !! the residual met the tolerance
       logical :: stopped = .false.              !! stopped (module stop_watch): the fields have no meaning
-      character(64) :: reason = ''              !! why the solver returned
+      character(128) :: reason = ''             !! why the solver returned
       real(dp) :: seconds = 0.0_dp              !! wall time of the solve
    end type solver_result_type
 

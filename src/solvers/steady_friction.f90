@@ -213,8 +213,8 @@ contains
          contact%height, contact%slope_x, contact%slope_y)
    end subroutine read_place
 
-   !> Complete the present contact and compute its errors. If it has not converged, the road and the ratio of the traction
-   !> are restored, so that the check does not affect the rounds.
+   !> Complete the present contact and compute its errors. If it has not converged, the road and the ratio of the
+   !> traction are restored, so that the check does not affect the rounds.
    subroutine examine(self, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
       type(steady_contact_type), intent(inout) :: contact

@@ -29,7 +29,8 @@ module steady_judge
       real(dp) :: direction(2) = 0.0_dp                !! e
       real(dp) :: base(2) = 0.0_dp                     !! displacement of the road, m
       real(dp) :: c = 0.0_dp                           !! c_t, Pa
-      real(dp), allocatable :: ratio(:, :, :)          !! T over the pressure or the strength (steady_bound) [nx, 2, rows]
+      !> T over the pressure, or over the strength (module steady_bound) [nx, 2, rows].
+      real(dp), allocatable :: ratio(:, :, :)
       real(dp), allocatable, private :: best(:, :, :)  !! P and T of the least error, Pa [nx, 3, rows]
    contains
       procedure :: bound_and_judge

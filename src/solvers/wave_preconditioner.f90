@@ -5,7 +5,7 @@
 !> side of a cell are many times larger than along the long side. B is therefore applied as a convolution, in single
 !> precision and at the cost of two transforms of the whole grid.
 !>
-!> The residual must also be extended to the cells N off the contact. With 0 on N, it would have a step at each edge
+!> The residual must also be extended to the cells N outside the contact. With 0 on N, it would have a step at each edge
 !> of the contact, whose short waves B multiplies by much more than the means of the rows. But these means matter:
 !> they are the waves along the long side of the cells, under which the solid is most compliant. A linear map E
 !> therefore keeps r on S, and sets the cells of N to the mean of r over the part of S in the same block of the coarse
@@ -75,14 +75,14 @@ contains
       call stiffness_symbols(grid, coarse%h, coarse%kernel, modes(1), symbol)
       call self%stiffness%set_symbol(symbol)
       ! Under a given load the mean of the direction is removed, so that the factor of the mean hardly matters. At a
-      ! given approach it decides about the load, and a stiffness like that along the long side would take many
+      ! given approach it determines the load, and the stiffness of a wave along the long side would take many
       ! iterations.
       self%of_mean = coarse%kernel%compliance(2.0_dp*pi/coarse%h) &
          /[coarse%kernel%compliance(pi/max(grid%lx, grid%ly)), coarse%kernel%compliance(pi/min(grid%lx, grid%ly))]
    end subroutine new_wave_preconditioner
 
-   !> Compute the stiffness of the solid for the waves of a periodic grid, relative to that for a wave of the length h, and 0 for
-   !> the mean.
+   !> Compute the stiffness of the solid for the waves of a periodic grid, relative to that for a wave of the length h,
+   !> and 0 for the mean.
    pure subroutine stiffness_symbols(grid, h, kernel, first, symbol)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: h                        !! side of a square cell of the same area, m
@@ -136,8 +136,8 @@ contains
       end do
    end subroutine set_residual
 
-   !> How far the mean gap of each block of a row of blocks is below the level, weighted by the pressure; 0 if it is above.
-   !> One value per cell along x.
+   !> The depth of the mean gap of each block of a row of blocks below the level, weighted by the pressure; 0 if it is
+   !> above. There is one value per cell along x.
    function block_depth(self, coarse, jb, level, pressure, gap) result(depth)
       class(wave_preconditioner_type), intent(in) :: self
       type(coarse_level_type), intent(in) :: coarse
