@@ -163,7 +163,7 @@ contains
       end do
    end function stiffness_sum
 
-   !> E(g) by that sum; history and load as given.
+   !> E(g) by that sum, with a traction of the past and a load.
    function energy_sum(grid, problem, height, gap, past, load) result(energy)
       type(grid_type), intent(in) :: grid
       type(adhesion_problem_type), intent(in) :: problem
@@ -212,7 +212,7 @@ contains
    end subroutine pressure_is_gradient_of_energy
 
    !> The conditions of a solution hold when they are recomputed, for both controls, both starts, and with a
-   !> history.
+   !> traction of the past.
    subroutine solution_meets_its_conditions(nx, ny, lx, ly, name)
       integer, intent(in) :: nx, ny
       real(dp), intent(in) :: lx, ly
@@ -259,7 +259,7 @@ contains
       call check_close(again, c%level, 1e-14_dp, name//': level kept')
       call check_close(maxval(abs(other - c%gap)), 0.0_dp, 1e-6_dp*range, name//': same gap')
 
-      ! A history is equivalent to a change of the height, H' = H - A P_h/Q.
+      ! A traction of the past is equivalent to a change of the height, H' = H - A P_h/Q.
       allocate (symbol(0:nx/2, 0:ny/2), source=0.0_dp)
       do j = 0, ny/2
          do i = 0, nx/2
@@ -275,8 +275,8 @@ contains
       c%problem%target = 0.05_dp
       other = c%gap
       call c%solver%solve(c%problem, shifted, other, c%pressure, again, c%outcome)
-      call check_that(c%outcome%converged, name//': no history: '//trim(c%outcome%reason))
-      call check_close(maxval(abs(other - c%gap)), 0.0_dp, 1e-6_dp*range, name//': history as height')
+      call check_that(c%outcome%converged, name//': no past: '//trim(c%outcome%reason))
+      call check_close(maxval(abs(other - c%gap)), 0.0_dp, 1e-6_dp*range, name//': past as height')
       call operator%destroy()
       call c%destroy()
    end subroutine solution_meets_its_conditions

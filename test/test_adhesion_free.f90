@@ -106,8 +106,8 @@ contains
       end do
    end function displacement_sum
 
-   !> The conditions of a solution hold with that sum, for both controls, with a history, and from full
-   !> contact.
+   !> The conditions of a solution hold with that sum, for both controls, with a traction of the past, and from
+   !> full contact.
    subroutine solution_meets_its_conditions(name)
       character(*), intent(in) :: name
       type(contact_type) :: c

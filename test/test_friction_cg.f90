@@ -903,7 +903,7 @@ contains
       end do
    end subroutine expected_slip_is_a_good_start
 
-   !> A traction T_h from the memory is equivalent to -A T_h in the motion.
+   !> A traction of the past T_h is equivalent to -A T_h in the motion.
    subroutine past_traction_is_like_a_drive()
       type(case_type) :: self
       real(dp), allocatable :: past_x(:, :), past_y(:, :), ux(:, :), uy(:, :), tx(:, :), ty(:, :)
@@ -917,21 +917,21 @@ contains
       past_y = -0.05_dp*self%p
       allocate (ux, uy, mold=self%tx)
       call solve_case(self, reshape([past_x, past_y], [36, 2, 30], order=[1, 3, 2]))
-      call check_that(self%result%converged, 'memory: converged')
+      call check_that(self%result%converged, 'past: converged')
       tx = self%tx
       ty = self%ty
       ! U = A (T + T_h) = DX - r, without a product by the caller.
       call self%operator%apply_vector(tx + past_x, ty + past_y, ux, uy)
       largest = maxval(hypot(self%drive_x - self%rx - ux, self%drive_y - self%ry - uy))
-      call check_order(largest, '<', 1e-13_dp, 'memory: slip = DX - A (T + T_h)')
+      call check_order(largest, '<', 1e-13_dp, 'past: slip = DX - A (T + T_h)')
       call self%operator%apply_vector(past_x, past_y, ux, uy)
       self%drive_x = self%drive_x - ux
       self%drive_y = self%drive_y - uy
       self%tx = 0.0_dp
       self%ty = 0.0_dp
-      call run_case(self, 'memory in the drive', 1e-8_dp)
+      call run_case(self, 'past in the drive', 1e-8_dp)
       largest = maxval(hypot(self%tx - tx, self%ty - ty))/maxval(hypot(tx, ty))
-      call check_order(largest, '<', 1e-6_dp, 'memory: the two ways agree')
+      call check_order(largest, '<', 1e-6_dp, 'past: the two ways agree')
       call end_case(self)
    end subroutine past_traction_is_like_a_drive
 

@@ -184,7 +184,7 @@ contains
          'a little more load: fewer iterations')
    end subroutine warm_starts_reach_the_same
 
-   !> A memory P_h is equivalent to a change A P_h/Q of the height.
+   !> A traction of the past P_h is equivalent to a change A P_h/Q of the height.
    subroutine past_traction_is_like_a_height(boundary)
       integer, intent(in) :: boundary
       type(grid_type) :: grid
@@ -216,12 +216,12 @@ contains
          end if
          call run_problem(grid, problem, h, s, thesis, past=past)
          call run_problem(grid, problem, h - u/unit_modulus, t)
-         call check_that(s%outcome%converged, 'memory: '//s%outcome%reason)
+         call check_that(s%outcome%converged, 'past: '//s%outcome%reason)
          call distance(grid, unit_modulus, h, s%pressure, t%pressure, d)
          ! The bound is for a fixed load. If the approach is prescribed the load is free, within the same
          ! energy.
-         call check_close(d, 0.0_dp, bound, 'memory: the pressure')
-         call check_close(s%level, t%level, 1e-6_dp*rms(h), 'memory: the level')
+         call check_close(d, 0.0_dp, bound, 'past: the pressure')
+         call check_close(s%level, t%level, 1e-6_dp*rms(h), 'past: the level')
       end do
    end subroutine past_traction_is_like_a_height
 

@@ -180,9 +180,10 @@ contains
          call move_alloc(self%error, error)
          error%message = map_fault(term, error%message)
       else if (self%faulty > 0) then
-         write (text, '(a, i0, a)') 'the height map has ', self%faulty, &
-            ' values that are not finite (NaN or infinite): all must be numbers, in m'
-         call fail(error, error_input, map_fault(term, trim(text)))
+         text = 'the height map has a value that is not finite'
+         if (self%faulty > 1) write (text, '(a, i0, a)') 'the height map has ', self%faulty, &
+            ' values that are not finite'
+         call fail(error, error_input, map_fault(term, trim(text)//' (NaN or infinite): all must be numbers, in m'))
       end if
    end subroutine finish
 

@@ -26,18 +26,19 @@ module roughness
 
    public :: height_psd, height_statistics, radial_psd, roughness_type
 
-   !> Statistics of a height map. Moments of the height are those about its mean.
+   !> Statistics of a height map. Moments of the height are those about its mean. Numbers that could not be computed
+   !> are 0.
    type :: roughness_type
-      real(dp) :: mean                    !! m
-      real(dp) :: lowest                  !! m
-      real(dp) :: highest                 !! m
-      real(dp) :: rms_height              !! m
-      real(dp) :: skewness                !! mean (h/rms)^3; 0 for a flat map
-      real(dp) :: kurtosis                !! mean (h/rms)^4; 3 if Gaussian, 0 for a flat map
-      real(dp) :: rms_slope               !! sqrt(mean |grad h|^2), spectral
-      real(dp) :: rms_slope_differences   !! the same from forward differences
-      real(dp) :: rms_curvature           !! 1/m: rms of (h_xx + h_yy)/2 (profile: h_xx)
-      real(dp) :: nayak                   !! m0 m4/m2^2, see height_statistics
+      real(dp) :: mean = 0.0_dp                    !! m
+      real(dp) :: lowest = 0.0_dp                  !! m
+      real(dp) :: highest = 0.0_dp                 !! m
+      real(dp) :: rms_height = 0.0_dp              !! m
+      real(dp) :: skewness = 0.0_dp                !! mean (h/rms)^3; 0 for a flat map
+      real(dp) :: kurtosis = 0.0_dp                !! mean (h/rms)^4; 3 if Gaussian, 0 for a flat map
+      real(dp) :: rms_slope = 0.0_dp               !! sqrt(mean |grad h|^2), spectral
+      real(dp) :: rms_slope_differences = 0.0_dp   !! the same from forward differences
+      real(dp) :: rms_curvature = 0.0_dp           !! 1/m: rms of (h_xx + h_yy)/2 (profile: h_xx)
+      real(dp) :: nayak = 0.0_dp                   !! m0 m4/m2^2, see height_statistics
    end type roughness_type
 
 contains
