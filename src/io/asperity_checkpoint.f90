@@ -111,9 +111,8 @@ contains
       class(checkpoint_writer_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      call report(self, error)
-      if (allocated(error)) return
-      call self%file%close(error)
+      call self%file%report(error)
+      if (.not. allocated(error)) call self%file%close(error)
       call write_block(self%temporary, error)
       call sync_file(self%temporary, error)
       call rename_file(self%temporary, self%path, error)

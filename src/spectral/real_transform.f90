@@ -27,14 +27,15 @@ module real_transform
 
 contains
 
-   !> Allocate the buffer and plan.
+   !> Allocate the buffer and make the plans.
    subroutine new_real_transform(self, nx, ny, error)
       type(real_transform_type), intent(inout) :: self
       integer, intent(in) :: nx, ny                              !! size of the field
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error      !! with an error, nothing is done
       integer(c_int) :: n(2), field_shape(2), spectrum_shape(2)
       character(80) :: text
 
+      if (allocated(error)) return
       call destroy_real_transform(self)
       self%nx = nx
       self%ny = ny

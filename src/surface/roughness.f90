@@ -168,7 +168,6 @@ contains
       integer :: i, j
 
       call check_shape(grid, height, error)
-      if (allocated(error)) return
       call new_real_transform(transform, grid%nx, grid%ny, error)
       if (allocated(error)) return
       !$omp parallel do default(none) shared(grid, height, mean, transform) private(i)
