@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -71,6 +72,14 @@ def test_areas_are_those_of_westergaard(tmp_path):
     assert "phase.pressure" in repr(table) and "sweep of 6 cases" in repr(table)
     assert table._repr_html_().count("<tr>") == 7 and "sweep of 6 cases" in table._repr_html_()
     assert table.row(1)["pressure"] == table.pressure[1]
+    assert [table.units(name) for name in ("phase.pressure", "mean_gap", "friction")] == [
+        "Pa", "m", "1"]
+    heads = re.findall(r"<th [^>]*>(.*?)</th>", table._repr_html_())
+    assert heads[:3] == ["phase.pressure<br>(Pa)", "material.shear_modulus<br>(Pa)",
+                         "contact_area"]
+    assert "mean_gap<br>(m)" in heads
+    with pytest.raises(KeyError, match="no column of the sweep"):
+        table.units("gap_mean_of")
     with pytest.raises(KeyError, match="did you mean 'friction'"):
         table["fricton"]
     with pytest.raises(AttributeError, match="did you mean 'friction'"):

@@ -2,17 +2,23 @@
 
 import io
 import os
+import re
 import subprocess
 import sys
 
 import h5py
+import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import asperity
 from asperity.__main__ import main
+from asperity.dma import DmaTable, fit_dma
+from asperity.material import Prony
+from asperity.runs.progress import Progress as ManyProgress
 from asperity.runs.run_progress import Progress
+from asperity.views.style import PRINT, print_style
 
 
 def test_contacts_and_cases_show_themselves_in_notebooks():
@@ -25,6 +31,13 @@ def test_contacts_and_cases_show_themselves_in_notebooks():
     case = asperity.Case(grid=dict(nx=8, ny=8, lx=1e-3), phase=[dict(pressure=1), dict(force=2)])
     html = case._repr_html_()
     assert "&amp;phase 2" in html and "force = 2" in html
+
+
+def test_numbers_and_their_units_stay_in_one_line(road):
+    html = asperity.open(road / "road.h5").history._repr_html_()
+    cells = re.findall(r'<td style="([^"]*)">([^<]*)</td>', html)
+    assert any("µm" in text for _, text in cells)
+    assert all("nowrap" in style for style, text in cells if re.match(r"-?\d", text))
 
 
 def test_roads_and_fits_show_themselves_in_notebooks(tmp_path):
@@ -47,6 +60,24 @@ def test_an_overview_is_shown_once_in_a_notebook(road, monkeypatch):
     monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
     figure = run.plot()
     assert not plt.get_fignums() and figure.axes
+
+
+def test_a_fit_is_shown_once_in_a_notebook(monkeypatch):
+    omega = np.geomspace(1.0, 1e4, 20)
+    modulus = Prony(1e6, [1e6], [1e-2]).complex_modulus(omega)
+    fit = fit_dma(DmaTable(omega, modulus.real, modulus.imag))
+    plt.close("all")
+    monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
+    assert fit.plot().axes and not plt.get_fignums()
+
+
+def test_the_display_of_figures_that_a_backend_switches_on_stays_on():
+    # A notebook's backend is chosen with the first figure, which may be one of ours.
+    with mpl.rc_context({"interactive": False}):
+        with print_style():
+            assert mpl.rcParams["font.size"] == PRINT["font.size"]
+            mpl.interactive(True)
+        assert mpl.is_interactive()
 
 
 def test_a_run_as_a_data_set(road):
@@ -76,7 +107,7 @@ def test_progress_is_throttled(monkeypatch):
     assert "s left" in lines[1] and "left" not in lines[-1]
 
 
-def test_progress_in_a_notebook_is_a_bar(monkeypatch):
+def test_progress_in_a_notebook_is_a_bar(monkeypatch, capsys):
     shown = []
 
     class Handle:
@@ -87,11 +118,21 @@ def test_progress_in_a_notebook_is_a_bar(monkeypatch):
         shown.append(bar)
         return Handle()
 
-    monkeypatch.setattr("asperity.runs.run_progress._notebook_display", lambda: display)
+    monkeypatch.setattr("asperity.runs.notebook_bar._notebook_display", lambda: display)
     progress = Progress(3)
     for step in range(3):
         progress.show(step, 0.0, 0.1, 0.5)
     assert 'value="3" max="3"' in shown[-1]._repr_html_() and len(shown) >= 2
+    shown.clear()
+    many = ManyProgress("sweep", 4, 3, quiet=False)
+    for number, fault in enumerate((None, "no contact", None)):
+        many.done(f"case{number}", fault, 1.0, 1)
+    assert 'value="4" max="4"' in shown[-1]._repr_html_() and len(shown) == 3
+    assert "4 of 4 done, 1 failed" in shown[-1]._repr_html_()
+    # Only what does not fit into a bar is printed.
+    assert capsys.readouterr().err.splitlines() == [
+        "sweep: 1 of 4 results are there already",
+        "sweep: 3 of 4 done, 1 failed, about 0.0 s left: case1: FAILED: no contact"]
 
 
 @pytest.mark.parametrize("wrong", [

@@ -81,7 +81,7 @@ def steady_mean(run: ResultFile, column: str = "friction") -> SteadyMean:
     total = travel[-1] / lap
     if total < 1.0 - 1e-9:
         mean = _mean_between(travel, values, 0.5 * travel[-1], travel[-1])
-        return SteadyMean(mean, math.nan, 0.5 * total,
+        return SteadyMean(mean, math.nan, float(0.5 * total),
                           f"the slide is {total:.2g} laps long, and the mean is over its second"
                           " half: over part of a lap it depends on which part that is, and may"
                           " even have the wrong sign")

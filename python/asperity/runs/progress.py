@@ -1,4 +1,4 @@
-"""The display of the progress of many runs on stderr."""
+"""The display of the progress of many runs: a bar in a notebook, elsewhere text on stderr."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ import sys
 import time
 from typing import TextIO
 
+from .notebook_bar import notebook_bar
+
 __all__ = ["Progress"]
 
 
 class Progress:
-    """The progress of many cases: one line that is rewritten in a terminal, else one per case."""
+    """The progress of many cases: one line that is rewritten in a terminal, else one per case.
+
+    In a notebook a bar takes the place of the lines, except for those about failed cases.
+    """
 
     def __init__(self, what: str, total: int, waiting: int, quiet: bool,
                  stream: TextIO | None = None) -> None:
@@ -18,6 +23,7 @@ class Progress:
         self._stream = sys.stderr if stream is None else stream
         self._quiet = quiet
         self._terminal = self._stream.isatty()
+        self._bar = notebook_bar() if stream is None and not quiet else None
         self._total = total
         self._kept = total - waiting
         self._waiting = waiting
@@ -63,7 +69,10 @@ class Progress:
         self._failed += fault is not None
         if self._quiet:
             return
-        if fault is not None or not self._terminal:
+        if self._bar is not None:
+            self._bar.show(self._kept + self._done, self._total,
+                           f"{self._what}: {self._state()}{self._left()}")
+        if fault is not None or not (self._terminal or self._bar):
             how = f"done in {_duration(seconds)}" if fault is None else f"FAILED: {fault}"
             self._line(f"{self._what}: {self._state()}{self._left()}: {name}: {how}")
         self.show(running)

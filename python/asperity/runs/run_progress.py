@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import sys
 import time as clock
-from html import escape
-from typing import Any, TextIO
+from typing import TextIO
+
+from .notebook_bar import notebook_bar
 
 __all__ = ["Progress"]
 
 _EVERY = 2.0           # time between two lines, s
 _EVERY_IN_NOTEBOOK = 0.2   # time between two updates of the bar, s
-
-
-def _notebook_display() -> Any:
-    """Return IPython's `display` in a notebook, None elsewhere."""
-    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    if shell is None or type(shell).__name__ != "ZMQInteractiveShell":
-        return None
-    from IPython.display import display
-
-    return display
 
 
 class Progress:
@@ -37,15 +28,14 @@ class Progress:
     def __init__(self, rows: int, stream: TextIO | None = None) -> None:
         self.rows = rows
         self._stream = stream
-        self._display = _notebook_display() if stream is None else None
-        self._handle: Any = None
+        self._bar = notebook_bar() if stream is None else None
         self._start = self._last = clock.monotonic()
         self._first_step: int | None = None
 
     def show(self, step: int, time: float, contact_area: float, friction: float) -> None:
         """Show a row if it is the first or the last one, or if enough time has passed."""
         now = clock.monotonic()
-        every = _EVERY if self._display is None else _EVERY_IN_NOTEBOOK
+        every = _EVERY if self._bar is None else _EVERY_IN_NOTEBOOK
         is_first = self._first_step is None
         if is_first:
             self._first_step = step
@@ -59,25 +49,7 @@ class Progress:
             left = f", {seconds:.0f} s left"
         text = (f"step {step} of {self.rows - 1}, t = {time:.6g} s, contact area"
                 f" {contact_area:.4g}, friction {friction:.4g}{left}")
-        if self._display is None:
+        if self._bar is None:
             print(text, file=self._stream or sys.stderr)
-            return
-        shown = _Bar(step + 1, self.rows, text)
-        if self._handle is None:
-            self._handle = self._display(shown, display_id=True)
         else:
-            self._handle.update(shown)
-
-
-class _Bar:
-    """A bar with its text, for a notebook."""
-
-    def __init__(self, done: int, rows: int, text: str) -> None:
-        self._done, self._rows, self._text = done, rows, text
-
-    def _repr_html_(self) -> str:
-        return (f'<progress value="{self._done}" max="{self._rows}" style="width:20em">'
-                f"</progress> {escape(self._text)}")
-
-    def __repr__(self) -> str:
-        return self._text
+            self._bar.show(step + 1, self.rows, text)

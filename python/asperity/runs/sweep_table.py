@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Failure", "Sweep", "SweepError", "column"]
 
+_UNIT_SIGNS = {"C": "°C"}
 _ROWS, _CELL = 30, 26   # largest numbers of rows and of characters per cell that are displayed
 
 
@@ -75,8 +76,10 @@ class Sweep(Mapping[str, NDArray[Any]]):
     """
 
     def __init__(self, columns: dict[str, NDArray[Any]], parameters: Sequence[str],
-                 shape: tuple[int, ...], paths: list[Path], failed: list[Failure]) -> None:
+                 shape: tuple[int, ...], paths: list[Path], failed: list[Failure],
+                 units: Mapping[str, str] | None = None) -> None:
         self._columns = columns
+        self._units = dict(units or {})
         self.parameters = tuple(parameters)
         self.results = tuple(name for name in columns if name not in self.parameters)
         self.shape = shape
@@ -88,6 +91,28 @@ class Sweep(Mapping[str, NDArray[Any]]):
     def rows(self) -> int:
         """Number of cases."""
         return len(self.paths)
+
+    def units(self, name: str) -> str:
+        """Return the units of a column.
+
+        Parameters
+        ----------
+        name : str
+            Name of the column.
+
+        Returns
+        -------
+        str
+            The units, such as 'm/s'; '1' for a pure number, and '' if they are not known, as for a
+            result of your own function, or if the column does not contain numbers.
+
+        Raises
+        ------
+        KeyError
+            If there is no such column.
+        """
+        self[name]
+        return self._units.get(name, "")
 
     def row(self, index: int) -> dict[str, Any]:
         """Return the parameters and results of one case.
@@ -179,8 +204,12 @@ class Sweep(Mapping[str, NDArray[Any]]):
 
     def _repr_html_(self) -> str:
         head, (names, *rows), more = self._cells()
-        return present("table_html", tuple(map(escape, names)),
-                          [tuple(map(escape, row)) for row in rows], f"{head} {more}".rstrip())
+        units = [self._units.get(name, "") for name in names]
+        heads = (escape(name) + (f"<br>({escape(unit)})" if unit not in ("", "1") else "")
+                 for name, unit in zip(names, map(_UNIT_SIGNS.get, units, units), strict=True))
+        caption = f"{head} ({more})" if more else head
+        return present("table_html", tuple(heads),
+                       [tuple(map(escape, row)) for row in rows], caption)
 
 
 class _Runs(Sequence[Run]):

@@ -28,6 +28,8 @@ from .sweep_table import Failure, Sweep, SweepError, column
 
 __all__ = ["sweep"]
 
+# A parameter: group, number of the group, variable.
+_PARAMETER = re.compile(r"\s*(\w+)\s*(?:\[\s*(-?\d+)\s*\])?\s*\.\s*(\w+)\s*")
 _LONGEST_NAME = 120     # largest number of characters of a file's name
 
 
@@ -232,8 +234,7 @@ def _targets(case: Case, name: str) -> tuple[list[Any], str]:
     ValueError: phase.velocity_y: there are 2 &phase and none names velocity_y: which one? \
 Say phase[1].velocity_y to phase[2].velocity_y
     """
-    found = re.fullmatch(r"\s*(\w+)\s*(?:\[\s*(-?\d+)\s*\])?\s*\.\s*(\w+)\s*", name) \
-        if isinstance(name, str) else None
+    found = _PARAMETER.fullmatch(name) if isinstance(name, str) else None
     if found is None:
         raise ValueError(f"{name!r}: must be a name such as 'solver.tolerance' or"
                          " 'phase[2].velocity_x'")
@@ -334,6 +335,7 @@ def _table(work: list[Job], shape: tuple[int, ...],
     failed = []
     found: list[dict[str, Any] | None] = []
     warned: dict[str, str] = {}
+    units = {name: _units_of(name) for name in work[0].values}
     for index, job in enumerate(work):
         if job.status != 0:
             failed.append(Failure(index, job.values, job.message, job.status))
@@ -344,6 +346,9 @@ def _table(work: list[Job], shape: tuple[int, ...],
         run = open_result(job.path)
         found.append({name: column[-1] for name, column in run.history.items()}
                      if measure is None else _measured(measure, run))
+        if measure is None or isinstance(measure, str):
+            units |= {name: run.history.units(name) if name in run.history else "1"
+                      for name in found[-1] or ()}
     for line, name in warned.items():
         warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
     parameters = list(work[0].values)
@@ -352,7 +357,24 @@ def _table(work: list[Job], shape: tuple[int, ...],
         if name in columns:
             raise ValueError(f"measure: {name} is the name of a parameter")
         columns[name] = column([None if row is None else row.get(name) for row in found])
-    return Sweep(columns, parameters, shape, [job.path for job in work], failed)
+    return Sweep(columns, parameters, shape, [job.path for job in work], failed, units)
+
+
+def _units_of(parameter: str) -> str:
+    """Return the units of a parameter, such as 'm/s' for "phase[2].velocity_x".
+
+    Examples
+    --------
+    >>> _units_of("phase[2].velocity_x"), _units_of("friction.coefficient")
+    ('m/s', '1')
+    >>> _units_of("friction.law")
+    ''
+    """
+    found = _PARAMETER.fullmatch(parameter)
+    entry = found and namelists.table()[found[1]].variables.get(found[3])
+    if not entry:
+        return ""
+    return entry.units or ("1" if entry.kind in ("integer", "real", "reals") else "")
 
 
 _MEANS = ("friction", "friction_viscous", "contact_area", "mean_gap", "displacement", "stick_area",

@@ -19,13 +19,16 @@ __all__ = ["case_html", "contact_html", "fit_html", "history_html", "road_html",
            "snapshot_html", "table_html"]
 
 CELL = "text-align:left;padding:0.1em 0.8em 0.1em 0"
+NUMBER = f"{CELL};white-space:nowrap"
 POINTS = 120  # largest number of points of a small curve
 
 
 def table_html(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
     """Return a table, whose cells are already HTML."""
     top = "".join(f'<th style="{CELL}">{name}</th>' for name in head)
-    lines = "".join("<tr>" + "".join(f'<td style="{CELL}">{cell}</td>' for cell in row) + "</tr>"
+    # Only the last column has texts that may be wrapped.
+    lines = "".join("<tr>" + "".join(f'<td style="{NUMBER}">{cell}</td>' for cell in row[:-1])
+                    + "".join(f'<td style="{CELL}">{cell}</td>' for cell in row[-1:]) + "</tr>"
                     for row in rows)
     first = f"<thead><tr>{top}</tr></thead>" if head else ""
     return (f'<div style="overflow-x:auto"><div>{caption}</div>'

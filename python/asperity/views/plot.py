@@ -36,6 +36,7 @@ from .style import (
     axis_text,
     label_of,
     print_style,
+    shown_once,
     si_scale,
     when,
 )
@@ -161,17 +162,6 @@ def plot_overview(run: Run) -> Figure:
                 other.set_box_aspect(max(ratio, 0.6))  # as tall as the maps
         _headline(run, figure)
         return shown_once(figure)
-
-
-def shown_once(figure: Figure) -> Figure:
-    """Return a figure so that a notebook displays it only once.
-
-    The inline backend displays all open figures at the end of a cell, and the value of the cell in
-    addition. A closed figure is displayed as the value only.
-    """
-    if "inline" in plt.get_backend().lower():
-        plt.close(figure)
-    return figure
 
 
 def _frictional_overview(run: Run) -> Figure:

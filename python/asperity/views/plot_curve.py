@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from .style import COLOURS, DOUBLE_COLUMN, print_style, si_scale
+from .style import COLOURS, DOUBLE_COLUMN, print_style, shown_once, si_scale
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,7 +77,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center",
                       frameon=False, ncols=4)
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
-    return figure
+    return shown_once(figure)
 
 
 def _words(name: str, value: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.check import array_of
-from .style import COLOURS, SINGLE_COLUMN, print_style
+from .style import COLOURS, SINGLE_COLUMN, print_style, shown_once
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,4 +138,4 @@ def plot_dma_fit(fit: DmaFit) -> Figure:
         rf" $\tan\delta$ {fit.error_tan_delta:.3f} (grey: beyond the data)", fontsize=9)
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize=8)
     middle.legend(frameon=False, fontsize=8)
-    return figure
+    return shown_once(figure)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
            "STICK", "axis_text", "check_picture", "label_of", "print_style", "save_picture",
-           "scale_limit", "sentence", "si_scale", "typeset", "typical_value", "when"]
+           "scale_limit", "sentence", "shown_once", "si_scale", "typeset", "typical_value", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -209,8 +211,29 @@ def typical_value(field: NDArray[Any]) -> float:
     return scale_limit(positive) if positive.size else 0.0
 
 
-def print_style() -> Any:
-    """Return a context in which new figures have the sizes of print."""
+@contextmanager
+def print_style() -> Iterator[None]:
+    """Give new figures the sizes of print."""
     import matplotlib as mpl
 
-    return mpl.rc_context(PRINT)
+    with mpl.rc_context(PRINT):
+        try:
+            yield
+        finally:
+            # The first figure chooses the backend. That of notebooks switches on the display of
+            # figures, which has to outlast this context.
+            interactive = mpl.is_interactive()
+    mpl.interactive(interactive)
+
+
+def shown_once(figure: Figure) -> Figure:
+    """Return a figure so that a notebook displays it only once.
+
+    The inline backend displays all open figures at the end of a cell, and the value of the cell in
+    addition. A closed figure is displayed as the value only.
+    """
+    import matplotlib.pyplot as plt
+
+    if "inline" in plt.get_backend().lower():
+        plt.close(figure)
+    return figure
