@@ -15,7 +15,8 @@ module asperity_signals
 
    integer(c_int), parameter :: signal_hang_up = 1        !! SIGHUP
    integer(c_int), parameter :: signal_interrupt = 2      !! SIGINT
-   integer(c_int), parameter :: signal_user = 10          !! SIGUSR1
+   integer(c_int), parameter :: signal_user_linux = 10    !! SIGUSR1 of Linux
+   integer(c_int), parameter :: signal_user_other = 30    !! SIGUSR1 of macOS and the BSDs, where 10 is SIGBUS
    integer(c_int), parameter :: signal_terminate = 15     !! SIGTERM
    integer(c_int), parameter :: signal_time = 24          !! SIGXCPU
    integer(c_int), parameter :: signal_file_size = 25     !! SIGXFSZ
@@ -57,13 +58,15 @@ contains
    !> because nohup relies on it.
    subroutine catch_signals()
       type(c_funptr) :: before, ignore
+      logical :: on_linux
 
       before = c_signal(signal_interrupt, c_funloc(note_stop))
       before = c_signal(signal_terminate, c_funloc(note_stop))
       before = c_signal(signal_time, c_funloc(note_stop))
       before = c_signal(signal_hang_up, c_funloc(note_stop))
       if (transfer(before, 0_c_intptr_t) == ignored) before = c_signal(signal_hang_up, before)
-      before = c_signal(signal_user, c_funloc(note_checkpoint))
+      inquire (file='/proc/self/status', exist=on_linux)
+      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux), c_funloc(note_checkpoint))
       ignore = transfer(ignored, ignore)
       before = c_signal(signal_file_size, ignore)
    end subroutine catch_signals
@@ -151,7 +154,7 @@ contains
    subroutine note_checkpoint(number) bind(c)
       integer(c_int), value :: number
 
-      asked = number == signal_user
+      asked = number > 0
    end subroutine note_checkpoint
 
 end module asperity_signals

@@ -52,8 +52,7 @@ contains
       end do
    end function lower
 
-   !> The candidate that is most like a word, for messages such as 'did you mean ...'; '' if none
-   !> is.
+   !> The candidate that is most like a word, for messages such as 'did you mean ...'; '' if no candidate is like it.
    pure function nearest_name(word, candidates) result(name)
       character(*), intent(in) :: word             !! as typed
       character(*), intent(in) :: candidates(:)    !! lower case, padded with blanks
@@ -110,8 +109,8 @@ contains
       distance = row(len(b))
    end function edit_distance
 
-   !> A text that is fit for a message: control characters and runs of blanks become one blank, and
-   !> a text that is longer than `longest` is cut.
+   !> A text that can be printed in one line of a message: control characters and runs of blanks become one blank,
+   !> and a text that is longer than `longest` is cut.
    pure function ordinary(text, longest) result(shown)
       character(*), intent(in) :: text
       integer, intent(in) :: longest      !! characters, at least 4
