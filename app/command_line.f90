@@ -2,12 +2,13 @@
 module command_line
    use asperity_errors, only : add_fault, error_input, error_type
    use asperity_precision, only : dp
+   use program_arguments, only : argument_text
    use text_tools, only : nearest_name, ordinary
    use time_limit, only : read_duration
    implicit none
    private
 
-   public :: argument_text, command_type, help_text, read_command_line
+   public :: command_type, help_text, read_command_line
 
    !> A command.
    type :: command_type
@@ -248,17 +249,6 @@ contains
       end subroutine alien
 
    end subroutine check_fit
-
-   !> An argument, at its full length.
-   function argument_text(i) result(text)
-      integer, intent(in) :: i
-      character(:), allocatable :: text
-      integer :: n
-
-      call get_command_argument(i, length=n)
-      allocate (character(n) :: text)
-      if (n > 0) call get_command_argument(i, text)
-   end function argument_text
 
    !> The proposal of a similar name, if there is one.
    pure function hint(name) result(text)

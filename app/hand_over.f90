@@ -1,10 +1,9 @@
 !> Commands that the Python package carries out, such as `asperity plot`. The program becomes
 !> `python3 -m asperity plot ...` if it finds a Python that has the package.
 module hand_over
-   use command_line, only : argument_text
+   use, intrinsic :: iso_c_binding, only : c_char, c_null_char, c_size_t
    use asperity_errors, only : error_file, error_type, fail
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_loc, c_null_char, c_null_ptr, c_ptr, &
-      c_size_t
+   use program_arguments, only : argument_text, argument_type, replace_program
    implicit none
    private
 
@@ -31,20 +30,7 @@ module hand_over
       ' ASPERITY_PYTHON=/path/to/python3 names a Python that has it" >&2'//nl// &
       'exit 3'//nl
 
-   !> An argument in the form that C needs.
-   type :: argument_type
-      character(kind=c_char), allocatable :: text(:)
-   end type argument_type
-
    interface
-      function c_execv(path, arguments) bind(c, name='execv') result(status)
-         import :: c_char, c_int, c_ptr
-         implicit none
-         character(kind=c_char), intent(in) :: path(*)
-         type(c_ptr), intent(in) :: arguments(*)
-         integer(c_int) :: status
-      end function c_execv
-
       function c_readlink(path, buffer, length) bind(c, name='readlink') result(count)
          import :: c_char, c_size_t
          implicit none
@@ -63,46 +49,28 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(*), intent(in), optional :: verb      !! with `option`, the only two arguments
       character(*), intent(in), optional :: option
-      type(argument_type), allocatable, target :: arguments(:)
-      type(c_ptr), allocatable :: pointers(:)
-      integer :: i, n, status
+      type(argument_type), allocatable :: arguments(:)
+      integer :: i, n
 
       n = command_argument_count()
       if (present(verb)) n = 2
-      allocate (arguments(5 + n), pointers(6 + n))
-      call put(arguments(1), 'sh')
-      call put(arguments(2), '-c')
-      call put(arguments(3), script)
-      call put(arguments(4), 'asperity')
-      call put(arguments(5), own_folder())
+      allocate (arguments(5 + n))
+      arguments(1)%text = 'sh'
+      arguments(2)%text = '-c'
+      arguments(3)%text = script
+      arguments(4)%text = 'asperity'
+      arguments(5)%text = own_folder()
       if (present(verb) .and. present(option)) then
-         call put(arguments(6), verb)
-         call put(arguments(7), option)
+         arguments(6)%text = verb
+         arguments(7)%text = option
       else
          do i = 1, n
-            call put(arguments(5 + i), argument_text(i))
+            arguments(5 + i)%text = argument_text(i)
          end do
       end if
-      do i = 1, 5 + n
-         pointers(i) = c_loc(arguments(i)%text)
-      end do
-      pointers(6 + n) = c_null_ptr
-      status = c_execv('/bin/sh'//c_null_char, pointers)
+      call replace_program('/bin/sh', arguments)
       call fail(error, error_file, 'asperity: /bin/sh cannot be started')
    end subroutine become_python
-
-   !> Put a text into an argument.
-   subroutine put(argument, text)
-      type(argument_type), intent(out) :: argument
-      character(*), intent(in) :: text
-      integer :: i
-
-      allocate (argument%text(len(text) + 1))
-      do i = 1, len(text)
-         argument%text(i) = text(i:i)
-      end do
-      argument%text(len(text) + 1) = c_null_char
-   end subroutine put
 
    !> The folder of this program's file; if the system does not report it, a folder that does not
    !> exist.
