@@ -22,7 +22,7 @@ module asperity_simulation
    use coupling_advice, only : advice_on_passes
    use finite_fields, only : reason_overflow
    use history_table, only : row_values
-   use pulled_road, only : guess_road, pull_outcome, take_road, watch_way
+   use pulled_road, only : guess_road, pull_outcome, take_road, watch_motion
    use rising_clock, only : seconds_now
    use road_motion, only : move_road
    use row_account, only : account, found_step_type
@@ -270,7 +270,7 @@ contains
          end if
          if (self%frictional) then
             call take_road(plan, state%schedule, self%tangential, self%rubs(), road, state%velocity)
-            call watch_way(plan, self%grid, road, state%way_reported, message)
+            call watch_motion(plan, self%grid, road, state%motion_reported, message)
             call add_warning(self%warnings, state%schedule%row, plan%time, message)
          end if
       end associate

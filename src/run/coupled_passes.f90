@@ -98,7 +98,7 @@ module coupled_passes
       real(dp), allocatable, private :: best_place(:, :, :) !! the place of the least mismatch, m
       logical, private :: sharing = .false.             !! the shares of the cells are unknown, too
       type(edge_rule_type), private :: edge             !! the rule by which the shares change in the present row
-      type(anderson_type), private :: mixing
+      type(anderson_type), private :: acceleration
       type(joint_step_type), private :: joint
    contains
       procedure :: solve
@@ -119,8 +119,8 @@ contains
       allocate (self%place(grid%nx, unknowns, grid%rows()), source=0.0_dp)
       allocate (self%place_residual, self%best_place, source=self%place)
       allocate (self%carried(grid%nx, 2, grid%rows()), source=0.0_dp)
-      call new_anderson(self%mixing, grid%nx, unknowns, grid%rows(), pairs)
-      self%mixing%largest = largest_factor
+      call new_anderson(self%acceleration, grid%nx, unknowns, grid%rows(), pairs)
+      self%acceleration%largest = largest_factor
    end subroutine new_coupled_passes
 
    !> Solve a row. The caller has moved the road and begun the tangential step.
@@ -156,7 +156,7 @@ contains
          if (contact%stop%given_up) return
          call control%judge(self%mismatch)
          if (control%best_yet) self%best_place(:, :, :) = self%place
-         if (control%forget) call self%mixing%forget()
+         if (control%forget) call self%acceleration%forget()
          if (control%joint_due) then
             ! The next pass is done at the joint solution. If there is none, the attempt has overwritten the result of
             ! the last pass, which is therefore repeated.
@@ -187,7 +187,7 @@ contains
 
       self%passes = 0
       self%gap_known = .false.
-      call self%mixing%forget()
+      call self%acceleration%forget()
       continues = .not. (plan%instantaneous .or. plan%new_speed)
       call predict(self, contact, plan%dt, motion, continues)
       call control%start(contact%case%solver%tolerance, merge(contact%state%first_mismatch, 1.0_dp, continues), &
@@ -326,10 +326,10 @@ contains
       end do
 
       if (control%plain) then
-         call control%follow(self%mixing%turn(self%place_residual))
-         call self%mixing%glide(self%place_residual, self%place, control%damping, control%momentum)
+         call control%follow(self%acceleration%cosine_with_last(self%place_residual))
+         call self%acceleration%momentum_step(self%place_residual, self%place, control%damping, control%momentum)
       else
-         call self%mixing%step([1.0_dp, 1.0_dp, weight_of_share], self%place_residual, self%place, plain=.false., &
+         call self%acceleration%step([1.0_dp, 1.0_dp, weight_of_share], self%place_residual, self%place, plain=.false., &
             damping=control%damping)
       end if
       if (self%sharing) self%place(:, 3, :) = min(max(self%place(:, 3, :), 0.0_dp), self%edge%share_length)

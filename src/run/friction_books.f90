@@ -15,7 +15,7 @@ module friction_books
    !> Sums over the cells.
    type :: rubbed_type
       real(dp) :: loss = 0.0_dp                       !! J/m2
-      real(dp) :: way(2) = 0.0_dp                     !! motion of the surface in the contact, m
+      real(dp) :: motion(2) = 0.0_dp                     !! motion of the surface in the contact, m
       real(dp) :: cells = 0.0_dp                      !! number of cells in contact
    end type rubbed_type
 

@@ -12,7 +12,7 @@ module pulled_road
    implicit none
    private
 
-   public :: drive_direction, guess_road, pull_outcome, take_road, watch_way
+   public :: drive_direction, guess_road, pull_outcome, take_road, watch_motion
 
 contains
 
@@ -63,7 +63,7 @@ contains
 
    !> Warn, once in a run, if a pull moves the road so far in a step that the contact is not resolved in time. For a road
    !> that is driven, module `case_phases` checks this before the run.
-   subroutine watch_way(plan, grid, road, reported, message)
+   subroutine watch_motion(plan, grid, road, reported, message)
       type(planned_row_type), intent(in) :: plan
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
@@ -85,7 +85,7 @@ contains
       else
          message = message//'let the pull grow along a ramp instead of at once'
       end if
-   end subroutine watch_way
+   end subroutine watch_motion
 
    !> Explain why a row has no solution if the friction cannot hold the pull.
    function pull_outcome(plan, tangential) result(reason)

@@ -30,7 +30,7 @@ module road_pull
       real(dp), private :: force(2) = 0.0_dp          !! F, Pa
       real(dp), private :: q = 0.0_dp                 !! Q of the step
       real(dp), private :: mass_offset(2) = 0.0_dp    !! offset at which T of a pulled mass equals F
-      real(dp), private :: mass_yields = 0.0_dp       !! compliance of this offset to T - F
+      real(dp), private :: mass_compliance = 0.0_dp   !! compliance of this offset to T - F
    contains
       procedure :: begin
       procedure :: place_mass
@@ -62,10 +62,10 @@ contains
       real(dp), intent(in) :: dt                      !! s; 0: instantaneous
 
       if (block%inert(dt)) then
-         self%mass_yields = self%q*block%height/block%resistance(dt)
-         self%mass_offset = -self%mass_yields*block%known(displacement, [0.0_dp, 0.0_dp], dt)
+         self%mass_compliance = self%q*block%height/block%resistance(dt)
+         self%mass_offset = -self%mass_compliance*block%known(displacement, [0.0_dp, 0.0_dp], dt)
       else
-         self%mass_yields = tiny(1.0_dp)
+         self%mass_compliance = tiny(1.0_dp)
          self%mass_offset = -self%q*displacement
       end if
    end subroutine place_mass
@@ -80,10 +80,10 @@ contains
       pull%traction = self%force - beside
       if (block%mass > 0.0_dp) then
          pull%offset = self%mass_offset
-         pull%yielding = self%mass_yields
+         pull%mass_compliance = self%mass_compliance
       else
          pull%offset = self%q*self%motion
-         pull%yielding = 0.0_dp
+         pull%mass_compliance = 0.0_dp
       end if
    end subroutine set_pull
 

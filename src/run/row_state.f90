@@ -48,7 +48,7 @@ module row_state
       integer :: moved_cells(2) = 0                 !! cells by which P has been shifted so far
       real(dp) :: first_mismatch = 1.0_dp           !! left by the first pass of the last step
       logical :: passes_reported = .false.              !! a warning of passes that did not settle was given
-      logical :: way_reported = .false.                 !! a warning of a pull that moves the road far was given
+      logical :: motion_reported = .false.                 !! a warning of a pull that moves the road far was given
       type(stick_slip_watch_type) :: watch          !! observations of the mean slip
       type(patch_size_type) :: widest               !! best resolved patches of contact at the end of a phase
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
@@ -87,7 +87,7 @@ contains
       call table%add('stick_slip/turns', state%watch%turns, 'alternations of that change')
       call table%add('passes/reported', state%passes_reported, &
          'a warning of passes that did not settle was given')
-      call table%add('pull/reported', state%way_reported, 'a warning of a pull that moves the road far was given')
+      call table%add('pull/reported', state%motion_reported, 'a warning of a pull that moves the road far was given')
       call table%add('passes/first_mismatch', state%first_mismatch, '1', &
          'mismatch that the first pass of the last step left')
 

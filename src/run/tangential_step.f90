@@ -345,7 +345,7 @@ contains
          call book_friction(state, self%law, self%trial, self%slip, pressure, slope_x, slope_y, rubbed)
       end if
       state%lost_friction = state%lost_friction + rubbed%loss*self%grid%cell_area()
-      if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%way/(rubbed%cells*self%dt)
+      if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%motion/(rubbed%cells*self%dt)
       state%displacement(:, :, :) = self%trial
    end subroutine commit
 

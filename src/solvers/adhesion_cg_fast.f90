@@ -28,9 +28,9 @@
 !>
 !> Memory, in fields of doubles: H, g, P, the spectrum of B, and the work fields exchange, residual, direction, old
 !> residual, change, image, the step before and its product, curvature, state and traction of the model. In free mode
-!> the spectrum and the work fields, except the curvature, have 4 times the cells. There are four more such fields: the
-!> state, the traction, psi and the spectrum of the true operator. Transforms are then counted in those of the doubled
-!> grid.
+!> the spectrum and the work fields, except the curvature, have 4 times the cells. There are three more such fields: the
+!> state, the traction and psi. The true operator takes three fields of the patch. Transforms are then counted in those
+!> of the doubled grid.
 module adhesion_cg_fast
    use adhesion_descent, only : approach_minimum
    use adhesion_method, only : adhesion_method_type

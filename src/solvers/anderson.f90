@@ -43,9 +43,9 @@ module anderson
       real(dp), allocatable, private :: last_f(:, :, :), last_g(:, :, :)
    contains
       procedure :: forget
-      procedure :: glide
+      procedure :: momentum_step
       procedure :: step
-      procedure :: turn
+      procedure :: cosine_with_last
    end type anderson_type
 
 contains
@@ -103,7 +103,7 @@ contains
    !> Compute the next iterate without acceleration but with momentum: x + b f + m (x - the last x). The part that
    !> all residuals have in common is followed with an effective factor b/(1 - m), and a part that changes its sign
    !> from one iterate to the next is damped as by b alone. All differences are discarded.
-   subroutine glide(self, f, x, damping, momentum)
+   subroutine momentum_step(self, f, x, damping, momentum)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
       real(dp), intent(inout) :: x(self%nx, self%components, self%rows)   !! in: x; out: the next
@@ -117,12 +117,12 @@ contains
       self%begun = .true.
       !$omp parallel do default(none) shared(self, f, x, damping, m) private(j) num_threads(self%threads)
       do j = 1, self%rows
-         call glide_row(self, damping, m, j, f(:, :, j), x(:, :, j))
+         call momentum_row(self, damping, m, j, f(:, :, j), x(:, :, j))
       end do
-   end subroutine glide
+   end subroutine momentum_step
 
-   !> Compute a row of `glide`, where the last x is the last g minus the last f.
-   subroutine glide_row(self, damping, m, j, f, x)
+   !> Compute a row of `momentum_step`, where the last x is the last g minus the last f.
+   subroutine momentum_row(self, damping, m, j, f, x)
       class(anderson_type), intent(inout) :: self
       real(dp), intent(in) :: damping, m
       integer, intent(in) :: j
@@ -135,11 +135,11 @@ contains
       self%last_f(:, :, j) = f
       self%last_g(:, :, j) = x + f
       x = next
-   end subroutine glide_row
+   end subroutine momentum_row
 
    !> The cosine of the angle between a residual and the last one. If there is no last one, it is 0.5, which
    !> suggests neither that the iterates follow a line nor that they turn back.
-   function turn(self, f) result(cosine)
+   function cosine_with_last(self, f) result(cosine)
       class(anderson_type), intent(in) :: self
       real(dp), intent(in) :: f(self%nx, self%components, self%rows)  !! g(x) - x
       real(dp) :: cosine
@@ -158,7 +158,7 @@ contains
       end do
       sums = row_totals(rows)
       if (min(sums(2), sums(3)) > 0.0_dp) cosine = sums(1)/(sqrt(sums(2))*sqrt(sums(3)))
-   end function turn
+   end function cosine_with_last
 
    !> Compute a row of the next iterate, with g = x + f: g - left f - sum gamma (dg - left df).
    subroutine combine_row(self, gamma, left, j, f, x)

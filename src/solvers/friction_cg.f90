@@ -26,8 +26,8 @@
 !> of a spring that pulls the road, and `least_scale`.
 !>
 !> Memory in addition to the caller's fields, in fields of doubles: eleven work fields, two for the spectrum of the
-!> operator, two for that of the preconditioner, and 3/4 for the symbols of the latter. The fallback takes four more from
-!> its first use on.
+!> operator (four on a free grid), two for that of the preconditioner, and 3/4 for the symbols of the latter. The
+!> fallback takes four more from its first use on.
 !>
 !> examples/friction_iterations and docs/benchmarks.md show how the number of iterations depends on the mesh. An
 !> iteration of 'fast' takes one and a half products of the operator if points slip, one if all stick, and one product
@@ -172,7 +172,7 @@ contains
 
       result%stopped = self%method%stopped
       result%residual = problem%residual
-      result%load_error = self%pull%missed(problem)
+      result%load_error = self%pull%missing_part(problem)
       result%reason = reason(self, problem, result)
       call self%pull%detach(problem, operator)
       result%ffts = result%ffts + operator%ffts + self%method%ffts
@@ -237,7 +237,7 @@ contains
       real(dp) :: before(2), factor, first(2), gained
       integer :: k, idle
 
-      self%pull%slides_off = problem%cells == 0 .and. self%pull%missed(problem) > 0.0_dp
+      self%pull%slides_off = problem%cells == 0 .and. self%pull%missing_part(problem) > 0.0_dp
       converged = .not. self%pull%slides_off
       if (problem%cells == 0) return
       first = problem%spring%end
@@ -246,12 +246,12 @@ contains
       do k = 1, most_moves
          converged = problem%solved(self%tolerance)
          if (.not. converged) return
-         if (self%pull%missed(problem) <= self%tolerance) return
+         if (self%pull%missing_part(problem) <= self%tolerance) return
          converged = .false.
-         before = self%pull%lacking(problem)
+         before = self%pull%missing_total(problem)
          call move_springs(self, problem, operator, factor*problem%spring%compliance*before, iterations)
          if (self%method%stopped) return
-         gained = dot_product(before, before - self%pull%lacking(problem)) &
+         gained = dot_product(before, before - self%pull%missing_total(problem)) &
             /max(dot_product(before, before), tiny(1.0_dp))
          idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)
          self%pull%slides_off = idle >= idle_moves
@@ -264,18 +264,18 @@ contains
    end subroutine meet_pull
 
    !> Move the ends of the springs by a distance, and solve the contact again.
-   subroutine move_springs(self, problem, operator, way, iterations)
+   subroutine move_springs(self, problem, operator, shift, iterations)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
-      real(dp), intent(in) :: way(2)               !! m
+      real(dp), intent(in) :: shift(2)               !! m
       integer, intent(inout) :: iterations
       type(friction_goal_type) :: goal
 
-      call problem%move_spring_end(way)
+      call problem%move_spring_end(shift)
       ! A move smaller than the tolerance must still change T, so the tolerance shrinks with the move.
       goal%tolerance = max(1.0e-3_dp*self%tolerance, &
-         min(self%tolerance, 0.1_dp*norm2(way)/problem%scale))
+         min(self%tolerance, 0.1_dp*norm2(shift)/problem%scale))
       goal%most_iterations = self%max_iterations
       if (problem%residual > goal%tolerance) call self%method%iterate(problem, operator, goal, iterations)
       if (.not. problem%fresh) call problem%refresh_slip(operator)

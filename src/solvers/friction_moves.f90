@@ -23,7 +23,7 @@ contains
       real(dp), intent(in) :: step
       real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
       logical, intent(in) :: again                   !! start again from the T before the last move
-      logical, intent(in) :: transform               !! transform the rows of T' on the way
+      logical, intent(in) :: transform               !! transform the rows of T' in the same pass
       logical, intent(out) :: returned               !! some points were returned to their bounds
       type(move_sums_type) :: sums
 

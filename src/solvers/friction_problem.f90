@@ -324,27 +324,27 @@ contains
       call shift_slip(self, self%spring%offset)
    end subroutine start_from_rest
 
-   !> Move the free end of the spring by `way`, and the road with it, and measure.
-   subroutine move_spring_end(self, way)
+   !> Move the free end of the spring by `shift`, and the road with it, and measure.
+   subroutine move_spring_end(self, shift)
       class(friction_problem_type), intent(inout) :: self
-      real(dp), intent(in) :: way(2)               !! m
+      real(dp), intent(in) :: shift(2)               !! m
 
-      call self%spring%move_end(way)
-      call shift_slip(self, way)
+      call self%spring%move_end(shift)
+      call shift_slip(self, shift)
    end subroutine move_spring_end
 
-   !> Add `way` to r everywhere, and measure it.
-   subroutine shift_slip(self, way)
+   !> Add `shift` to r everywhere, and measure it.
+   subroutine shift_slip(self, shift)
       type(friction_problem_type), intent(inout) :: self
-      real(dp), intent(in) :: way(2)               !! m
+      real(dp), intent(in) :: shift(2)               !! m
       type(measure_sums_type), allocatable :: rows(:)
       integer :: j
 
       allocate (rows(self%rows))
-      !$omp parallel do default(none) shared(self, way, rows) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, shift, rows) private(j) num_threads(self%threads)
       do j = 1, self%rows
-         self%slip(:, 1, j) = self%slip(:, 1, j) + way(1)
-         self%slip(:, 2, j) = self%slip(:, 2, j) + way(2)
+         self%slip(:, 1, j) = self%slip(:, 1, j) + shift(1)
+         self%slip(:, 2, j) = self%slip(:, 2, j) + shift(2)
          call measure_row(self, j, rows(j))
       end do
       call finish_measure(self, rows)

@@ -10,7 +10,7 @@
 !> too.
 !>
 !> If there is a mass between the pull and the contact, the total of T may differ from the pull. The difference
-!> moves the road: offset = (given offset) - yielding (mean T - traction). This is a spring, too.
+!> moves the road: offset = (given offset) - mass_compliance (mean T - traction). This is a spring, too.
 module friction_pull
    use fft_conv, only : convolution_type
    use field_sums, only : field_count, field_sum
@@ -31,14 +31,15 @@ module friction_pull
       !> Before a solve this is a guess, or the offset of a mass for which T has the prescribed mean. After the solve
       !> it is the solution, or 0 along a direction without a prescribed mean. In the units of DX'.
       real(dp) :: offset(2) = 0.0_dp
-      real(dp) :: yielding(2) = 0.0_dp           !! m for G = 1 Pa; 0: the total is met
+      !> With a mass: the compliance of the offset to mean T - traction, m for G = 1 Pa. 0: the total of T equals the pull.
+      real(dp) :: mass_compliance(2) = 0.0_dp
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
       real(dp), private :: mean_mode(2) = 0.0_dp !! symbols that were removed from the operator
    contains
       procedure :: attach
       procedure :: detach
-      procedure :: missed
-      procedure :: lacking
+      procedure :: missing_part
+      procedure :: missing_total
    end type friction_pull_type
 
 contains
@@ -64,7 +65,7 @@ contains
          problem%spring%pull(c) = self%traction(c)*cells
          ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
          problem%spring%compliance(c) = softer*problem%compliance/sqrt(touching)
-         if (self%yielding(c) > 0.0_dp) problem%spring%compliance(c) = self%yielding(c)/cells
+         if (self%mass_compliance(c) > 0.0_dp) problem%spring%compliance(c) = self%mass_compliance(c)/cells
          problem%spring%end(c) = self%offset(c) &
             - self%mean_mode(c)*(problem%spring%pull(c) + past_total(problem, c))
          problem%mean_compliance(c) = merge(problem%spring%compliance(c), 0.0_dp, &
@@ -102,29 +103,29 @@ contains
       if (associated(problem%past)) total = field_sum(problem%past(:, c, :))
    end function past_total
 
-   !> The pull minus the total of T, Pa; 0 along a direction that is not pulled or whose mass yields.
-   pure function lacking(self, problem) result(difference)
+   !> The pull minus the total of T, Pa; 0 along a direction that is not pulled or whose force acts on a mass.
+   pure function missing_total(self, problem) result(difference)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: difference(2)
 
       difference = merge(problem%spring%pull - problem%spring%total, 0.0_dp, &
-         self%along .and. .not. self%yielding > 0.0_dp)
-   end function lacking
+         self%along .and. .not. self%mass_compliance > 0.0_dp)
+   end function missing_total
 
-   !> Size of `lacking` relative to the largest of three forces: the pull, the total, and the force that
+   !> Size of `missing_total` relative to the largest of three forces: the pull, the total, and the force that
    !> would displace road and contact as far as they are displaced.
-   pure function missed(self, problem) result(part)
+   pure function missing_part(self, problem) result(part)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: part
       real(dp) :: compliance, size
 
-      part = norm2(self%lacking(problem))
+      part = norm2(self%missing_total(problem))
       if (.not. part > 0.0_dp) return
       compliance = maxval(problem%spring%compliance)/softer + maxval(self%mean_mode)
       size = max(norm2(problem%spring%pull), norm2(problem%spring%total), problem%scale/compliance)
       part = part/size
-   end function missed
+   end function missing_part
 
 end module friction_pull

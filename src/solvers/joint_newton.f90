@@ -302,7 +302,7 @@ contains
       class(joint_system_type), intent(inout) :: system
       type(cell_vector_type), intent(in) :: step
       integer, intent(in) :: round
-      integer :: j, k, turn
+      integer :: chosen, j, k
 
       call change(self, system, step)
       do j = 1, size(self%follow, 2)
@@ -320,8 +320,8 @@ contains
       end do
       if (round > 2 .and. self%best%merit >= (1.0_dp - idle)*self%now%merit) then
          ! No length reduces the residual. Take a short step nevertheless, to leave this point.
-         turn = 1 + modulo(7*round, 4)
-         call try_length(self, system, step, lengths(turn))
+         chosen = 1 + modulo(7*round, 4)
+         call try_length(self, system, step, lengths(chosen))
          call self%best%copy(self%trial)
       end if
       call self%now%copy(self%best)

@@ -47,12 +47,12 @@ contains
    end subroutine follow
 
    !> Move the free end of the springs. The total of T does not change, so that the road moves by the same distance.
-   pure subroutine move_end(self, way)
+   pure subroutine move_end(self, shift)
       class(road_spring_type), intent(inout) :: self
-      real(dp), intent(in) :: way(2)         !! m
+      real(dp), intent(in) :: shift(2)         !! m
 
-      self%end = self%end + way
-      self%offset = self%offset + way
+      self%end = self%end + shift
+      self%offset = self%offset + shift
    end subroutine move_end
 
    !> Add the part of the springs to the quadratic form d.A d of a search direction d.
