@@ -12,33 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import common
 import numpy as np
+from viscoelastic_sphere import CREEP, RADIUS, RATIO, WIDTH, base
 
 import asperity
-from asperity import theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MINUTES = 2
 
-GLASSY, CREEP, RATIO = 2.75e6, 0.01, 9.0       # G0, Pa; eta/G1, s; G0/G1
-RADIUS, FORCE = 10e-3, 0.15                    # m, N
-WIDTH = theory.hertz(RADIUS, 4 * GLASSY, force=FORCE).contact_radius      # a*
 #: The speed of figure 2.8.
 SHOWN = 0.8
-
-
-def base(cells: int, travel: float, across: float = 8.0) -> asperity.Case:
-    """Return a case: `cells` in a*; `travel` and width of the map, `across`, in a*."""
-    cell = WIDTH / cells
-    nx, ny = (2 * round(length * cells / 2) for length in (travel + across, across))
-    return asperity.Case(
-        grid=dict(nx=nx, ny=ny, lx=nx * cell, ly=ny * cell, boundary="free"),
-        surface=dict(shape="paraboloid", radius=RADIUS, centre_x=ny // 2 * cell),
-        material=dict(zener_g0=GLASSY, zener_g1=GLASSY / RATIO, zener_eta=GLASSY / RATIO * CREEP),
-        phase=[dict(name="rest", force=FORCE),
-               dict(name="slide", duration=1.0, steps=round(travel * cells), velocity_x=0.0)],
-        solver=dict(tolerance=1e-7))
 
 
 def rest(time: float) -> tuple[float | None, int | None, bool]:

@@ -12,45 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import common
 import numpy as np
+from viscoelastic_sphere import CREEP, FORCE, RADIUS, RATIO, WIDTH, base
 
 import asperity
-from asperity import theory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MINUTES = 3
 
-GLASSY, CREEP, RATIO = 2.75e6, 0.01, 9.0       # G0, Pa; eta/G1, s; G0/G1
-RADIUS, FORCE = 10e-3, 0.15                    # m, N
-#: Contact radius with the glassy modulus: the unit of length, as in the thesis.
-UNIT = theory.hertz(RADIUS, 4 * GLASSY, force=FORCE)
-WIDTH = UNIT.contact_radius
 MEAN = FORCE / (np.pi * WIDTH**2)
 PROFILES = (0.4, 0.8, 1.2)
-
-
-def base(cells: float, travel: float, across: float = 8.0) -> asperity.Case:
-    """Return a case: a jump of the load, and sliding immediately afterwards with steps of one cell.
-
-    Parameters
-    ----------
-    cells : float
-        Cells in a*.
-    travel : float
-        Sliding distance, a*.
-    across : float
-        Width of the map, a*; the relaxed contact is 4.3 wide.
-    """
-    cell = WIDTH / cells
-    nx, ny = (2 * round(length * cells / 2) for length in (travel + across, across))
-    return asperity.Case(
-        grid=dict(nx=nx, ny=ny, lx=nx * cell, ly=ny * cell, boundary="free"),
-        surface=dict(shape="paraboloid", radius=RADIUS, centre_x=ny // 2 * cell),
-        material=dict(zener_g0=GLASSY, zener_g1=GLASSY / RATIO, zener_eta=GLASSY / RATIO * CREEP),
-        phase=[dict(force=FORCE),
-               dict(duration=1.0, steps=round(travel * cells), velocity_x=0.0)],
-        solver=dict(tolerance=1e-7))
 
 
 def slide(folder: Path, speeds: Sequence[float], cells: float, travel: float) -> asperity.Sweep:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["array_of", "choice", "exactly_one", "no_masked", "number", "poisson_ratio",
-           "positive", "shown", "stresses_of", "whole"]
+           "positive", "positives", "shown", "stresses_of", "whole"]
 
 T = TypeVar("T")
 
@@ -96,6 +96,22 @@ def positive(name: str, value: float) -> float:
         If it is not a number, not finite, or not above zero.
     """
     return number(name, value, 0.0, low_open=True)
+
+
+def positives(**values: float) -> tuple[float, ...]:
+    """Return several values, each as a finite float above zero.
+
+    Raises
+    ------
+    ValueError
+        If one is not a number, not finite, or not above zero; the message names the first such one.
+
+    Examples
+    --------
+    >>> positives(radius=1, modulus=2e6)
+    (1.0, 2000000.0)
+    """
+    return tuple(positive(name, value) for name, value in values.items())
 
 
 def whole(name: str, value: float) -> int:

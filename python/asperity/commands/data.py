@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-__all__ = ["add_columns", "add_fit", "add_import", "columns_of"]
+__all__ = ["add_columns", "add_fit", "add_import", "check_folder", "columns_of"]
 
 
 def add_import(verbs: Any) -> None:
@@ -132,6 +132,12 @@ def columns_of(chosen: argparse.Namespace) -> dict[str, str]:
     return columns
 
 
+def check_folder(path: Path) -> None:
+    """Raise OSError if the folder of a file that is to be written does not exist."""
+    if not path.parent.is_dir():
+        raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
+
+
 def _other_groups(path: Path) -> str:
     """Return the groups of an input other than `&material`, or '' if there are none."""
     if not path.is_file():
@@ -149,18 +155,15 @@ def _fit(chosen: argparse.Namespace) -> int:
     check_picture(chosen.plot)
     output = chosen.output
     if output is not None:
-        if not output.parent.is_dir():
-            raise OSError(f"{output}: cannot be written: there is no folder"
-                          f" {str(output.parent)!r}")
+        check_folder(output)
         if output.exists() and chosen.table.exists() and output.samefile(chosen.table):
             raise ValueError(f"--output {output}: is the table itself")
         other = _other_groups(output)
         if other:
             raise ValueError(f"--output {output}: holds {other}, too, and would be replaced: name"
                              " another file, and add the group from there")
-    if chosen.plot is not None and not chosen.plot.parent.is_dir():
-        raise OSError(f"{chosen.plot}: cannot be written: there is no folder"
-                      f" {str(chosen.plot.parent)!r}")
+    if chosen.plot is not None:
+        check_folder(chosen.plot)
     table = read_dma(
         chosen.table, columns=columns_of(chosen), frequency_unit=chosen.frequency_unit,
         modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,

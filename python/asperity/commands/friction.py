@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .data import add_columns, columns_of
+from .data import add_columns, check_folder, columns_of
 
 if TYPE_CHECKING:
     from ..results.friction_curve import FrictionCurve
@@ -147,9 +147,7 @@ def _friction(chosen: argparse.Namespace) -> int:
     for output in outputs:
         if output.suffix.lower() not in _KINDS:
             raise ValueError(f"--output {output}: must end in {', '.join(_KINDS)}")
-        if not output.parent.is_dir():
-            raise OSError(f"{output}: cannot be written: there is no folder"
-                          f" {str(output.parent)!r}")
+        check_folder(output)
     from ..curves import plan_curve, run_curve
     from ..curves.running import SubmittedError
     from ..curves.sources import compound_of, road_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.names import UnknownNameError, counted, unknown_name
+from ..base.names import OpenValues, counted
 from ..base.optional import needed
 from ..base.presenters import present
 from ..results import Run, open_result
@@ -53,7 +53,7 @@ class Failure:
         return f"{values}: {self.message}"
 
 
-class Sweep(Mapping[str, NDArray[Any]]):
+class Sweep(OpenValues):
     """The table of a sweep, with one row per case and one column per parameter or result.
 
     ``table["friction"]`` and ``table.friction`` are the same NumPy array. A failed case has NaN, or
@@ -78,7 +78,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
     def __init__(self, columns: dict[str, NDArray[Any]], parameters: Sequence[str],
                  shape: tuple[int, ...], paths: list[Path], failed: list[Failure],
                  units: Mapping[str, str] | None = None) -> None:
-        self._columns = columns
+        super().__init__(columns, "column of the sweep")
         self._units = dict(units or {})
         self.parameters = tuple(parameters)
         self.results = tuple(name for name in columns if name not in self.parameters)
@@ -132,7 +132,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
         IndexError
             If there are not so many cases.
         """
-        return {name: column[index] for name, column in self._columns.items()}
+        return {name: column[index] for name, column in self._values.items()}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the table as a data frame of pandas, which must be installed.
@@ -149,35 +149,7 @@ class Sweep(Mapping[str, NDArray[Any]]):
         """
         pandas = needed("pandas", "to_pandas")
         return pandas.DataFrame({name: list(column) if column.ndim > 1 else column
-                                 for name, column in self._columns.items()})
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        try:
-            return self._columns[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError(unknown_name("column of the sweep", name,
-                                                self._columns)) from None
-
-    def __getattr__(self, name: str) -> NDArray[Any]:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        try:
-            return self._columns[name]
-        except KeyError:
-            raise AttributeError(unknown_name("column of the sweep", name,
-                                              self._columns)) from None
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._columns)
-
-    def __len__(self) -> int:
-        return len(self._columns)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self._columns})
-
-    def _ipython_key_completions_(self) -> list[str]:
-        return list(self._columns)
+                                 for name, column in self._values.items()})
 
     def _cells(self) -> tuple[str, list[list[str]], str]:
         """Return a heading, the cells of a short table, and a remark on what it leaves out."""
@@ -185,13 +157,13 @@ class Sweep(Mapping[str, NDArray[Any]]):
                                      if name in self.results)]
         if len(shown) == len(self.parameters):
             shown += self.results[:3]
-        cells = [[_short(self._columns[name][row]) for name in shown]
+        cells = [[_short(self._values[name][row]) for name in shown]
                  for row in range(min(self.rows, _ROWS))]
         head = f"sweep of {counted(self.rows, 'case')}"
         if self.failed:
             head += f", {len(self.failed)} failed"
         more = [f"{number} more {what}" for number, what in
-                ((self.rows - len(cells), "rows"), (len(self._columns) - len(shown), "columns"))
+                ((self.rows - len(cells), "rows"), (len(self._values) - len(shown), "columns"))
                 if number > 0]
         return head, [shown, *cells], f"and {' and '.join(more)}" if more else ""
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
-from ..base.check import array_of, exactly_one, number, positive
+from ..base.check import array_of, exactly_one, number, positive, positives
 from .hertzian import _dome, hertz_displacement
 
 FloatArray = NDArray[np.float64]
@@ -56,8 +56,7 @@ def tabor_parameter(radius: float, modulus: float, energy: float, length: float)
     >>> round(tabor_parameter(1.0, 1.0, 1.0, 0.5), 12)
     2.0
     """
-    r, e = positive("radius", radius), positive("modulus", modulus)
-    w, z = positive("energy", energy), positive("length", length)
+    r, e, w, z = positives(radius=radius, modulus=modulus, energy=energy, length=length)
     return (r * w**2 / e**2) ** (1.0 / 3.0) / z
 
 
@@ -207,8 +206,7 @@ def jkr(
     >>> round(jkr(r, e, w, force=0.0).contact_radius / unit, 6)
     1.817121
     """
-    r, e = positive("radius", radius), positive("modulus", modulus)
-    w = positive("energy", energy)
+    r, e, w = positives(radius=radius, modulus=modulus, energy=energy)
     k = 4.0 * e / 3.0
     pull_off = -1.5 * math.pi * w * r
     name, given = exactly_one(force=force, contact_radius=contact_radius)
@@ -263,8 +261,7 @@ def dmt(
     >>> contact.contact_radius
     0.0
     """
-    r, e = positive("radius", radius), positive("modulus", modulus)
-    w = positive("energy", energy)
+    r, e, w = positives(radius=radius, modulus=modulus, energy=energy)
     pull_off = -2.0 * math.pi * w * r
     name, given = exactly_one(force=force, contact_radius=contact_radius)
     if name == "force":
@@ -349,8 +346,7 @@ def maugis(
     >>> round(contact.pull_off_force, 5)
     -1.60073
     """
-    r, e = positive("radius", radius), positive("modulus", modulus)
-    w = positive("energy", energy)
+    r, e, w = positives(radius=radius, modulus=modulus, energy=energy)
     kind, lam = exactly_one(range=range, tabor=tabor, maugis_parameter=maugis_parameter)
     lam = positive(kind, lam)
     per_stress = 2.0 * (9.0 * r / (16.0 * math.pi * w * e * e)) ** (1.0 / 3.0)

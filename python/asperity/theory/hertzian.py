@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.check import array_of, exactly_one, number, positive
+from ..base.check import array_of, exactly_one, number, positive, positives
 
 FloatArray = NDArray[np.float64]
 
@@ -149,7 +149,7 @@ def hertz(
     >>> float(contact.displacement(0.0)) == contact.approach
     True
     """
-    r, e = positive("radius", radius), positive("modulus", modulus)
+    r, e = positives(radius=radius, modulus=modulus)
     name, given = exactly_one(force=force, contact_radius=contact_radius, approach=approach)
     given = number(name, given, 0.0)
     if name == "force":
@@ -286,7 +286,7 @@ def hertz_line(
     >>> round(line.half_width * 1e3, 6), round(line.peak_pressure)
     (1.128379, 56419)
     """
-    r, e = positive("radius", radius), positive("modulus", modulus)
+    r, e = positives(radius=radius, modulus=modulus)
     name, given = exactly_one(load=load, half_width=half_width)
     given = positive(name, given)
     a = math.sqrt(4.0 * given * r / (math.pi * e)) if name == "load" else given

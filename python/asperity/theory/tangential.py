@@ -101,21 +101,14 @@ def _advance(levels: list[float], x: float) -> None:
             else:
                 levels.append(x)
             return
-        onwards = (x - levels[-1]) * (levels[-1] - levels[-2]) >= 0.0
-        if onwards:
+        if (x - levels[-1]) * (levels[-1] - levels[-2]) >= 0.0:  # onwards
             levels.pop()
             if len(levels) == 1:
                 continue
-            if abs(x - levels[-1]) >= abs(levels[-2] - levels[-1]):
-                levels.pop()
-                continue
+        if abs(x - levels[-1]) < abs(levels[-2] - levels[-1]):
             levels.append(x)
             return
-        if abs(x - levels[-1]) >= abs(levels[-2] - levels[-1]):
-            levels.pop()
-            continue
-        levels.append(x)
-        return
+        levels.pop()
 
 
 def mindlin(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import ive, kve
 
-from ..base.check import array_of, number, poisson_ratio, positive
+from ..base.check import array_of, number, poisson_ratio, positive, positives
 from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
@@ -426,7 +426,7 @@ def hunter(
     >>> round(hunter(10e-3, 50.0, 0.02, solid).friction, 7)
     0.0154267
     """
-    r, w, v = positive("radius", radius), positive("load", load), positive("velocity", velocity)
+    r, w, v = positives(radius=radius, load=load, velocity=velocity)
     nu = poisson_ratio(poisson)
     arms = material.g > 0.0
     if int(arms.sum()) != 1:

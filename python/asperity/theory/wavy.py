@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.check import array_of, choice, number, poisson_ratio, positive
+from ..base.check import array_of, choice, number, poisson_ratio, positives
 from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
@@ -136,8 +136,8 @@ def westergaard(
     >>> round(wave.area_fraction, 12), round(wave.full_pressure, 6)
     (0.5, 3141.592654)
     """
-    d, wave = positive("amplitude", amplitude), positive("wavelength", wavelength)
-    e, p = positive("modulus", modulus), number("pressure", pressure, 0.0)
+    d, wave, e = positives(amplitude=amplitude, wavelength=wavelength, modulus=modulus)
+    p = number("pressure", pressure, 0.0)
     full = math.pi * e * d / wave
     square = min(1.0, p / full)
     half = wave / math.pi * math.asin(math.sqrt(square))
