@@ -4,11 +4,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from conftest import write_result
+from matplotlib.colors import to_rgb
 from PIL import Image
 
 import asperity
 from asperity.__main__ import main
 from asperity.views.film import _animation, film
+from asperity.views.style import COLOURS
 
 
 @pytest.fixture(autouse=True)
@@ -63,3 +65,12 @@ def test_the_colour_bar_is_as_tall_as_a_flat_map(tmp_path):
     panel, _, bar = (axes.get_window_extent().height for axes in figure.axes)
     assert bar < 1.3 * panel
     animation._draw_was_started = True
+
+
+def test_a_gif_keeps_rare_colours(road, tmp_path):
+    with Image.open(film(asperity.open(road / "road.h5"), tmp_path / "gap.gif", "gap")) as picture:
+        picture.seek(1)
+        pixels = np.asarray(picture.convert("RGB"), dtype=float)
+    # The mark on the curve, and the upper end of the colour scale.
+    for colour in (to_rgb(COLOURS[1]), plt.get_cmap("cividis")(1.0)[:3]):
+        assert np.abs(pixels - 255.0 * np.array(colour)).max(axis=-1).min() < 10.0

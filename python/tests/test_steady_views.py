@@ -11,6 +11,7 @@ import asperity
 from asperity.report import report_page
 from asperity.results.derived import road_speed
 from asperity.results.steady import steady_rows, steady_speeds
+from asperity.views.film import _animation
 
 SPEEDS = (0.01, 1.0, 100.0)
 
@@ -80,6 +81,19 @@ def test_without_friction_a_curve_shows_area_and_loss_over_the_speed(tmp_path):
     assert [axes.get_ylabel() for axes in panels] == ["contact area fraction",
                                                       "friction coefficient"]
     assert panels[0].get_xlabel() == "sliding speed (m/s)"
+
+
+def test_a_film_of_a_curve_goes_along_the_speeds(tmp_path):
+    run = computed(tmp_path / "film.h5", steady(*SPEEDS), output=dict(snapshot_every=1),
+                   friction=dict(law="coulomb", coefficient=0.3))
+    animation, figure = _animation(run, "contact")
+    panel, curve = figure.axes
+    for number, speed in enumerate(("10 mm/s", "1 m/s", "100 m/s")):
+        animation._func(number)
+        assert panel.get_title().startswith(f"step {number}, steady at {speed}, friction 0.")
+        assert curve.lines[1].get_xdata() == [SPEEDS[number]]
+    assert (curve.get_xlabel(), curve.get_xscale()) == ("sliding speed (m/s)", "log")
+    animation._draw_was_started = True
 
 
 def test_a_single_row_of_a_viscoelastic_road_shows_a_section(tmp_path):

@@ -11,8 +11,11 @@ import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
+from PIL.Image import Dither, Quantize
 
 from ..results.derived import has_friction
+from ..results.steady import steady_speeds
+from .plot import horizontal, steady_words
 from .plot_fields import field_style, frame_of, state_style, without_open_cells
 from .style import (
     COLOURS,
@@ -73,6 +76,8 @@ def film(run: Run, path: Path, field: str | None = None, *,
                          " `&output snapshot_every = 1 /` stores one for each row")
     if run.grid.ny == 1:
         raise ValueError(f"{run.path}: a film needs a map: this is a line contact, ny = 1")
+    if field is None:
+        field = "contact" if has_friction(run) and "contact" in run.snapshots[0] else "pressure"
     if frames_per_second is None:
         frames_per_second = float(np.clip(len(run.snapshots) / SHORTEST, 2.0, 12.0))
     if path.suffix.lower() == ".mp4":
@@ -80,14 +85,37 @@ def film(run: Run, path: Path, field: str | None = None, *,
             raise OSError(f"{path}: ffmpeg is not installed: write a .gif")
         writer: Any = FFMpegWriter(fps=frames_per_second)
     else:
-        writer = PillowWriter(fps=frames_per_second)
-    if field is None:
-        field = "contact" if has_friction(run) and "contact" in run.snapshots[0] else "pressure"
+        writer = _GifWriter(64 if field == "contact" else 256, frames_per_second)
     with print_style():
         animation, figure = _animation(run, field)
         animation.save(path, writer=writer, dpi=110)
         plt.close(figure)
     return path
+
+
+class _GifWriter(PillowWriter):
+    """Writes frames whose colours cover all that occur, as the ends of a colour scale.
+
+    Pillow's own choice favours frequent colours, and shows a small mark in that of its neighbours.
+
+    Parameters
+    ----------
+    colours : int
+        Number of colours, up to 256.
+    fps : float
+        Number of frames per second.
+    """
+
+    def __init__(self, colours: int, fps: float) -> None:
+        super().__init__(fps=fps)
+        self.colours = colours
+
+    def finish(self) -> None:
+        """Write the file."""
+        self._frames = [frame.convert("RGB").quantize(self.colours, method=Quantize.MAXCOVERAGE,
+                                                      dither=Dither.NONE)
+                        for frame in self._frames]
+        super().finish()
 
 
 def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
@@ -119,11 +147,17 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
 
     history = run.history
     column = "friction" if np.any(history["friction"]) else "contact_area"
-    along = "time" if np.ptp(history["time"]) > 0.0 else "step"
-    scale, along_unit = si_scale(history[along], history.units(along))
-    curve.plot(history[along] * scale, history[column], color=COLOURS[0])
+    if steady_speeds(run) is not None:
+        along, label, log = horizontal(run)
+    else:
+        name = "time" if np.ptp(history["time"]) > 0.0 else "step"
+        scale, along_unit = si_scale(history[name], history.units(name))
+        along, label, log = history[name] * scale, axis_text(LABELS[name], along_unit), False
+    curve.plot(along, history[column], color=COLOURS[0])
     (mark,) = curve.plot([], [], "o", color=COLOURS[1])
-    curve.set_xlabel(axis_text(LABELS[along], along_unit))
+    curve.set_xlabel(label)
+    if log:
+        curve.set_xscale("log")
     curve.set_ylabel(axis_text(LABELS[column], ""))
     curve.grid(alpha=0.3)
     curve.set_box_aspect(max(ratio, 0.6))
@@ -140,7 +174,7 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
         image.set_data(values if field == "contact"
                        else without_open_cells(values * factor, field))
         row = int(np.searchsorted(history["step"], snapshot.step))
-        mark.set_data([history[along][row] * scale], [history[column][row]])
+        mark.set_data([along[row]], [history[column][row]])
         title.set_text(_moment(snapshot, snapshots[-1]))
         return image, mark, title
 
@@ -159,7 +193,7 @@ def _sample(snapshots: list[Snapshot], field: str) -> NDArray[Any]:
 def _moment(snapshot: Snapshot, last: Snapshot) -> str:
     """Return step and time of a snapshot, with the unit and the decimals of all frames."""
     if last.time == 0.0:
-        return when(snapshot)
+        return when(snapshot) + steady_words(snapshot.run, snapshot.step)
     factor, unit = si_scale(last.time, "s")
     decimals = max(0, 2 - math.floor(math.log10(last.time * factor)))
     return f"step {snapshot.step}, t = {snapshot.time * factor:.{decimals}f} {unit}"

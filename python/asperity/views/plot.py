@@ -47,7 +47,8 @@ if TYPE_CHECKING:
 
     from ..results import Run
 
-__all__ = ["plot_field", "plot_history", "plot_overview", "plot_section", "si_scale"]
+__all__ = ["horizontal", "plot_field", "plot_history", "plot_overview", "plot_section", "si_scale",
+           "steady_words"]
 
 # Colours and line styles of the parts of friction and of energy.
 PARTS = {"viscous": (COLOURS[1], "--"), "interface": (COLOURS[2], "-."),
@@ -91,7 +92,7 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     if name != "energy" and name not in history:
         raise UnknownNameError(unknown_name("column of the history", name, [*history, "energy"]))
     if x is None and name != "sliding_speed" and steady_speeds(run) is not None:
-        along, label, log = _horizontal(run)
+        along, label, log = horizontal(run)
     else:
         if x is None:
             x = next((column for column in ("time", "pressure", "step")
@@ -181,7 +182,7 @@ def _frictional_overview(run: Run) -> Figure:
                         layout="constrained")
     parts = figure.subfigures(1, 2, width_ratios=(1.0, 1.0)) if maps else [figure]
     panels = parts[0].subplots(len(columns), 1, sharex=True, squeeze=False)[:, 0]
-    along, head, log = _horizontal(run)
+    along, head, log = horizontal(run)
     for name, panel in zip(columns, panels, strict=True):
         _draw(run, name, along, panel, {})
         if log:
@@ -303,12 +304,12 @@ def _headline(run: Run, figure: Figure) -> None:
     words = [f"{run.title or run.path.name}"]
     if len(run.snapshots):
         words.append(when(run.snapshots[-1]))
-        words[-1] += _steady_words(run, run.snapshots[-1].step)
+        words[-1] += steady_words(run, run.snapshots[-1].step)
     figure.suptitle(": ".join(words) + ("" if run.finished else " (run not finished)"),
                     parse_math=False)
 
 
-def _steady_words(run: Run, step: int) -> str:
+def steady_words(run: Run, step: int) -> str:
     """Return the speed and the friction if a step is a state of steady sliding, or else ''."""
     history = run.history
     row = int(np.searchsorted(history["step"], step))
@@ -352,7 +353,7 @@ def _load_panel(run: Run, axes: Axes) -> None:
     _legend_above(axes)
 
 
-def _horizontal(run: Run) -> tuple[NDArray[Any], str, bool]:
+def horizontal(run: Run) -> tuple[NDArray[Any], str, bool]:
     """Return values and label of the horizontal axis, and whether the axis is logarithmic.
 
     It is the speed for a curve of steady states, otherwise the time or, if that suits better, the
@@ -371,7 +372,7 @@ def _horizontal(run: Run) -> tuple[NDArray[Any], str, bool]:
 def _time_panel(run: Run, axes: Axes) -> None:
     """Draw contact area, and friction of a moving road, against time or travel."""
     names = ["contact_area", *(["friction"] if np.any(run.history["friction"]) else [])]
-    along, head, log = _horizontal(run)
+    along, head, log = horizontal(run)
     marker = "o" if len(along) <= 40 else ""
     for number, (name, panel) in enumerate(zip(names, (axes, None), strict=False)):
         panel = panel or axes.twinx()
