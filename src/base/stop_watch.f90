@@ -38,6 +38,7 @@ contains
 
       asperity_stop_question => question
       patience = seconds
+      since = -1.0_dp
    end subroutine begin_watch
 
    !> End the watch.

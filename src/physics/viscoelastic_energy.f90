@@ -107,7 +107,10 @@ contains
       real(dp), intent(out) :: work         !! J
       real(dp), intent(out) :: loss         !! all of it, J
       real(dp), intent(out) :: numerical    !! the part that the scheme itself lost, J
-      real(dp) :: a, d, e, g, r, x
+      real(dp) :: a, g, x                   ! of arm k: alpha, modulus, dt/tau
+      real(dp) :: d                         ! dU.dS, m3
+      real(dp) :: e                         ! E_k at the start, Pa2 m3
+      real(dp) :: r                         ! p_k.dU with p_k at the start, J
       integer :: k
 
       d = products%du_ds*self%cell_area
@@ -135,7 +138,11 @@ contains
       type(products_type), intent(in) :: products
       real(dp), intent(out) :: work         !! J
       real(dp), intent(out) :: loss         !! J
-      real(dp) :: c, chi, d, g, k_du, k_k, omega, phi, r, r_k, w, x
+      real(dp) :: chi, g, omega, phi, x     ! of arm k: its functions, modulus and dt/tau
+      real(dp) :: c, d                      ! dU.dS_old and dU.dS, m3
+      real(dp) :: k_du, k_k                 ! the products of A^-1 K with dU and with K, m3
+      real(dp) :: r, r_k                    ! the products of p_k at the start with dU and with K, J
+      real(dp) :: w
       integer :: k
 
       w = material%weight
@@ -167,7 +174,9 @@ contains
       type(energy_books_type), intent(inout) :: self
       type(zener_type), intent(in) :: material
       type(products_type), intent(in) :: products
-      real(dp) :: a, b1, b2, c, d, r
+      real(dp) :: a, b1, b2                 ! of arm k
+      real(dp) :: c, d                      ! dU.dS_old and dU.dS, m3
+      real(dp) :: r                         ! p_k.dU with p_k at the start, J
       integer :: k
 
       d = products%du_ds*self%cell_area

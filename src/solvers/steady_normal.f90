@@ -222,7 +222,7 @@ contains
       end if
       level = field_sum(merge(gap, 0.0_dp, pressure > 0.0_dp)) &
          /max(field_count(pressure > 0.0_dp), 1.0_dp)
-      self%c = 1.0_dp/operator%longest
+      self%c = 1.0_dp/operator%largest_compliance
       scale = fitting_scale(pressure, gap - level)
       if (scale > 0.0_dp) self%c = bounded_scale(operator, scale)
       call operator%set_scale(self%c)

@@ -36,7 +36,7 @@ contains
       real(dp), intent(in) :: c                        !! Pa/m
       real(dp) :: limited
 
-      limited = min(max(c, 0.02_dp/operator%longest), 50.0_dp/operator%shortest)
+      limited = min(max(c, 0.02_dp/operator%largest_compliance), 50.0_dp/operator%least_compliance)
    end function bounded_scale
 
    !> The factor by which two scales differ; 1 if one of them is not known.

@@ -49,8 +49,8 @@ module steady_operator
       integer :: last = 0                              !! ... last wave number along x of the tables
       integer :: threads = 1
       logical :: frictional = .false.
-      real(dp) :: longest = 0.0_dp                     !! largest |K|, m/Pa
-      real(dp) :: shortest = 0.0_dp                    !! smallest |K|, m/Pa
+      real(dp) :: largest_compliance = 0.0_dp          !! largest |K|, m/Pa
+      real(dp) :: least_compliance = 0.0_dp            !! smallest |K|, m/Pa
       integer(int64) :: ffts = 0                       !! real transforms done so far
       type(row_column_type), private :: scalar, vector
       type(scalar_type), private :: normal, inverse, resolvent
@@ -114,8 +114,8 @@ contains
             allocate (self%tangential%second(3, self%first:self%last, 0:self%ny - 1))
          end if
       end if
-      self%longest = symbols%longest
-      self%shortest = symbols%shortest
+      self%largest_compliance = symbols%largest_compliance
+      self%least_compliance = symbols%least_compliance
       self%symbol(:, :) = symbols%normal
       self%normal%table(:, :) = factor*symbols%normal
       self%inverse%table(:, :) = 0.0_dp

@@ -49,8 +49,8 @@ module steady_symbols
       complex(dp), allocatable :: normal(:, :)         !! K, m/Pa (first:last, 0:ny-1)
       complex(dp), allocatable :: tangential(:, :, :)  !! A_T: xx, yy, xy, m/Pa (3, first:last, 0:ny-1)
       complex(dp), allocatable :: stretch(:, :, :)     !! d/ds A_T along the motion, of the same shape, 1/Pa
-      real(dp) :: longest = 0.0_dp                     !! largest |K|, m/Pa
-      real(dp) :: shortest = 0.0_dp                    !! smallest |K|, m/Pa
+      real(dp) :: largest_compliance = 0.0_dp          !! largest |K|, m/Pa
+      real(dp) :: least_compliance = 0.0_dp            !! smallest |K|, m/Pa
    end type steady_symbols_type
 
 contains
@@ -82,8 +82,8 @@ contains
             extremes(:, j) = [maxval(compliance), minval(compliance, mask=compliance > 0.0_dp)]
          end associate
       end do
-      self%longest = global_max(maxval(extremes(1, :)))
-      self%shortest = global_min(minval(extremes(2, :)))
+      self%largest_compliance = global_max(maxval(extremes(1, :)))
+      self%least_compliance = global_min(minval(extremes(2, :)))
    end subroutine new_steady_symbols
 
    !> The symbols of one mode: the mean over the wave vectors that it stands for.
