@@ -3,7 +3,7 @@ module command_line
    use asperity_errors, only : add_fault, error_input, error_type
    use asperity_precision, only : dp
    use program_arguments, only : argument_text
-   use text_tools, only : nearest_name, ordinary
+   use text_tools, only : in_one_line, nearest_name
    use time_limit, only : read_duration
    implicit none
    private
@@ -108,7 +108,7 @@ contains
          case ('--threads')
             call take_threads()
          case default
-            call refuse(ordinary(name, 60)//': there is no such option'//hint(nearest_name(name, options)))
+            call refuse(in_one_line(name, 60)//': there is no such option'//hint(nearest_name(name, options)))
          end select
       end subroutine take_option
 
@@ -119,7 +119,7 @@ contains
             if (argument == 'help') then
                help = .true.
             else if (.not. any(verbs == argument)) then
-               call refuse(''''//ordinary(argument, 60)//''': there is no such command'// &
+               call refuse(''''//in_one_line(argument, 60)//''': there is no such command'// &
                   hint(nearest_name(argument, verbs))//'; '//verbs_in_words)
                done = .true.
             else if (any(python_verbs == argument)) then
@@ -130,7 +130,7 @@ contains
             command%path = argument
             if (argument == '') call refuse(command%verb//': the name that follows it is empty')
          else
-            call refuse(''''//ordinary(argument, 60)//''' is one argument too many')
+            call refuse(''''//in_one_line(argument, 60)//''' is one argument too many')
          end if
       end subroutine take_word
 
@@ -182,7 +182,7 @@ contains
          if (verify(value, '0123456789') == 0 .and. len(value) < 10) &
             read (value, *, iostat=status) command%threads
          if (status /= 0 .or. command%threads < 1 .or. command%threads > 1024) call refuse('--threads '// &
-            ordinary(value, 60)//': must be an integer from 1 to 1024')
+            in_one_line(value, 60)//': must be an integer from 1 to 1024')
       end subroutine take_threads
 
       !> --time-limit H:M:S
@@ -193,7 +193,7 @@ contains
          call take_value(value)
          if (.not. allocated(value)) return
          call read_duration(value, command%time_limit, valid)
-         if (.not. valid) call refuse('--time-limit '//ordinary(value, 60)//': must be a duration such '// &
+         if (.not. valid) call refuse('--time-limit '//in_one_line(value, 60)//': must be a duration such '// &
             'as 90 (minutes), 1:30:00 (hours, minutes, seconds) or 2-12:00:00 (with days)')
       end subroutine take_time_limit
 

@@ -26,7 +26,7 @@ program main
    use standard_streams, only : say, say_error
    use asperity_surface, only : check_files
    use linked_libraries, only : linked_versions
-   use text_tools, only : nearest_name, ordinary, to_text
+   use text_tools, only : in_one_line, nearest_name, to_text
    use asperity_version, only : version_number
    use wait_policy, only : wait_passively
    implicit none
@@ -95,7 +95,7 @@ contains
       else if (.not. allocated(command%path)) then
          call say(template_list(), error)
       else if (find_template(command%path) == 0) then
-         message = 'asperity: there is no template '''//ordinary(command%path, 60)//''''
+         message = 'asperity: there is no template '''//in_one_line(command%path, 60)//''''
          near = nearest_name(command%path, all_template_names())
          if (near /= '') message = message//'; did you mean '//near//'?'
          call fail(error, error_input, message)

@@ -9,7 +9,7 @@ module test_namelist
    use namelist_file, only : namelists_type, scan_namelists, shown_tokens
    use asperity_precision, only : dp
    use reference_page, only : reference_markdown
-   use text_tools, only : exact_text, lower, nearest_name, next_line, ordinary, to_text
+   use text_tools, only : exact_text, in_one_line, lower, nearest_name, next_line, to_text
    implicit none
    private
 
@@ -171,9 +171,9 @@ contains
       call check_that(nearest_name('thick', names) == 'thickness', 'the start of a name')
       call check_that(nearest_name('zzzzzz', names) == '', 'nothing is near')
       call check_that(nearest_name('', names) == '', 'no word')
-      call check_that(ordinary('a'//nl//achar(9)//'  b'//achar(0), 10) == 'a b', 'ordinary')
-      call check_that(ordinary('abcdefghijk', 10) == 'abcdefg...', 'a long text is cut')
-      call check_that(ordinary('abcdefghij', 10) == 'abcdefghij', 'a text of full length is not')
+      call check_that(in_one_line('a'//nl//achar(9)//'  b'//achar(0), 10) == 'a b', 'in_one_line')
+      call check_that(in_one_line('abcdefghijk', 10) == 'abcdefg...', 'a long text is cut')
+      call check_that(in_one_line('abcdefghij', 10) == 'abcdefghij', 'a text of full length is not')
    end subroutine words_and_their_nearest_names
 
    !> Lines are taken in order, empty ones too. The last one may end with the text.

@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: add_line, exact_text, lower, nearest_name, next_line, ordinary, to_text
+   public :: add_line, exact_text, in_one_line, lower, nearest_name, next_line, to_text
 
    !> Convert a number to a short text.
    interface to_text
@@ -111,7 +111,7 @@ contains
 
    !> A text that can be printed in one line of a message: control characters and runs of blanks become one blank,
    !> and a text that is longer than `longest` is cut.
-   pure function ordinary(text, longest) result(shown)
+   pure function in_one_line(text, longest) result(shown)
       character(*), intent(in) :: text
       integer, intent(in) :: longest      !! characters, at least 4
       character(:), allocatable :: shown
@@ -139,7 +139,7 @@ contains
       else
          shown = trim(buffer(:n))
       end if
-   end function ordinary
+   end function in_one_line
 
    !> An integer as text.
    pure function text_of_integer(number) result(text)

@@ -7,7 +7,7 @@ module namelist_file
    use input_faults, only : faults_type
    use namelist_tokens, only : token_broken, token_close, token_comma, token_equals, token_open, &
       token_parenthesis, token_type, token_word, tokenise
-   use text_tools, only : lower, ordinary, to_text
+   use text_tools, only : in_one_line, lower, to_text
    implicit none
    private
 
@@ -273,7 +273,7 @@ contains
       end do
       shown = ''
       if (end < first) return
-      shown = ordinary(file%text(file%tokens(first)%first:file%tokens(end)%last), longest)
+      shown = in_one_line(file%text(file%tokens(first)%first:file%tokens(end)%last), longest)
    end function shown_tokens
 
 end module namelist_file

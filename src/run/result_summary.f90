@@ -10,7 +10,7 @@ module result_summary
    use asperity_precision, only : dp
    use result_check, only : damage_type, find_damage
    use result_target, only : damage_of_result
-   use text_tools, only : ordinary, to_text
+   use text_tools, only : in_one_line, to_text
    implicit none
    private
 
@@ -96,7 +96,7 @@ contains
          call file%read_attribute('/grid', 'lx', lx)
          call file%read_attribute('/grid', 'ly', ly)
          call file%read_attribute('/grid', 'boundary', boundary)
-         text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//ordinary(boundary, 40)
+         text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//in_one_line(boundary, 40)
       end if
       text = text//nl//'heights     '//to_text(minval(height))//' m to '//to_text(maxval(height))// &
          ' m, rms '//to_text(sqrt(sum((height - sum(height)/size(height))**2)/size(height)))//' m'//nl
@@ -124,7 +124,7 @@ contains
          if (at == 0) exit
          words = words(:at - 1)//'; '//words(at + 1:)
       end do
-      if (words /= '') line = head//ordinary(words, most)//nl
+      if (words /= '') line = head//in_one_line(words, most)//nl
    end function attribute_line
 
    !> Summarise an open result.
@@ -151,7 +151,7 @@ contains
       if (allocated(error)) return
 
       text = 'file        '//path//nl
-      text = text//'case        '//ordinary(title, 200)//nl
+      text = text//'case        '//in_one_line(title, 200)//nl
       text = text//'written     '//written//' by asperity '//maker//nl
       text = text//'grid        '//to_text(nx)//' x '//to_text(ny)//' cells, '//to_text(lx)//' m x '// &
          to_text(ly)//' m, '//boundary//nl
@@ -166,7 +166,7 @@ contains
       if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
          call file%read_attribute('/', 'outcome', outcome)
          if (outcome == 'running') outcome = 'still running, or killed'//row_note(file)
-         text = text//'outcome     '//ordinary(outcome, 400)//nl
+         text = text//'outcome     '//in_one_line(outcome, 400)//nl
       end if
       call add_warnings(file, 'warnings', text)
       call add_warnings(file, 'run_warnings', text)
@@ -203,7 +203,7 @@ contains
       do while (at <= len(lines))
          next = index(lines(at:), nl)
          if (next == 0) next = len(lines) - at + 2
-         if (next > 1) text = text//'warning     '//ordinary(lines(at:at + next - 2), 400)//nl
+         if (next > 1) text = text//'warning     '//in_one_line(lines(at:at + next - 2), 400)//nl
          at = at + next
       end do
    end subroutine add_warnings
