@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import frictional_result, write_result
 from matplotlib.colors import to_rgba
+from matplotlib.legend import Legend
 from matplotlib.patches import Rectangle
 from matplotlib.quiver import Quiver, QuiverKey
 
@@ -133,6 +134,12 @@ def test_line_contact_shades_stick_and_slip(tmp_path):
     lines = {line.get_label(): line.get_ydata() for line in axes.lines}
     assert set(lines) == {"Pressure", "Traction along x", "Traction along y"}
     np.testing.assert_allclose(lines["Pressure"], snapshot.pressure[0] / 1e3)
+    # The legend of the lines lies between data and title.
+    axes.figure.canvas.draw()
+    (legend,) = (item for item in axes.artists if isinstance(item, Legend))
+    box = legend.get_window_extent()
+    assert box.y0 >= axes.get_window_extent().y1 - 1.0
+    assert box.y1 <= axes.title.get_window_extent().y0 + 1.0
 
 
 def test_friction_is_split_into_its_causes(frictional):

@@ -193,7 +193,7 @@ def _frictional_overview(run: Run) -> Figure:
                                strict=True):
             plot_field(snapshot, name, panel)
             panel.set_title("Stick and slip" if name == "contact" else LABELS[name],
-                            pad=15.0 if name == "contact" and grid.ny > 1 else None)
+                            pad={"contact": 19.0 if grid.ny == 1 else 15.0}.get(name))
     _headline(run, figure)
     return shown_once(figure)
 

@@ -87,7 +87,9 @@ def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = Non
         drawn = (wanted and grid.ny > 1 and "traction_x" in snapshot and "traction_y" in snapshot
                  and _arrows(snapshot, ax))
         head = "Stick and slip" if name == "contact" and has_friction(snapshot.run) else label
-        ax.set_title(f"{head}, {when(snapshot)}", pad=15.0 if drawn else None)
+        # There is a key of arrows, or a legend of tractions, between map and title.
+        pad = 19.0 if name == "contact" and grid.ny == 1 else 15.0 if drawn else None
+        ax.set_title(f"{head}, {when(snapshot)}", pad=pad)
     return ax
 
 
@@ -418,7 +420,8 @@ def _contact_profile(snapshot: Snapshot, axes: Axes) -> None:
     axes.set_xlabel(f"x ({length_unit})")
     axes.set_ylabel(axis_text("Traction", unit))
     if fields:
-        axes.add_artist(axes.legend(loc="upper right", frameon=True, framealpha=0.8))
+        axes.add_artist(axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False,
+                                    ncols=len(fields), columnspacing=1.2, borderaxespad=0.3))
     _state_legend(axes, colours, names)
 
 
