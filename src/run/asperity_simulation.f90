@@ -64,7 +64,7 @@ module asperity_simulation
       procedure :: propose
       procedure :: accept
       procedure :: reject
-      procedure :: take_up
+      procedure :: resume
       procedure :: destroy
    end type simulation_type
 
@@ -93,8 +93,8 @@ contains
       if (.not. self%has_steady) return
       call new_steady_step(self%steady, case, self%rms_height, error)
       if (allocated(error)) return
-      call self%state%steady%last%take(self%steady%last)
-      call self%state%steady%before%take(self%steady%before)
+      call self%state%steady%last%copy(self%steady%last)
+      call self%state%steady%before%copy(self%steady%before)
    end subroutine new_simulation
 
    !> Find the state after the next row, without changing the present one. If the solvers do not converge, the
@@ -128,16 +128,16 @@ contains
       self%warnings = self%warnings(:self%old_warnings)
       self%converged = .true.
       self%reason = ''
-      call self%take_up()
+      call self%resume()
    end subroutine reject
 
-   !> Continue from `state`, which the caller has replaced.
-   subroutine take_up(self)
+   !> Prepare to continue from `state`, which the caller has replaced.
+   subroutine resume(self)
       class(simulation_type), intent(inout) :: self
 
       call place_road(self, self%state%row%road_x, self%state%row%road_y)
       self%finished = self%state%schedule%phase > size(self%case%phases)
-   end subroutine take_up
+   end subroutine resume
 
    !> Do the next row. If the solvers do not converge, the state that they have reached is kept. After a row that
    !> was abandoned (`stop%given_up`) the state is that of the row before.
@@ -167,8 +167,8 @@ contains
          call take_step(self, parts(k), error)
          if (allocated(error)) return
          if (self%stop%given_up) then
-            call self%stop%put_back(self%state)
-            call self%take_up()
+            call self%stop%restore(self%state)
+            call self%resume()
             return
          end if
          call self%stop%part_ends()
@@ -177,7 +177,7 @@ contains
       end do
       if (size(parts) > 1) call sums%put_into(self%state%row, self%tangential%slip)
       call watch_cells(self, plan, self%warnings)
-      call look_for_overflow(self)
+      call check_finite(self)
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine do_row
 
@@ -291,12 +291,12 @@ contains
          self%residual = found%rubbing%residual
          if (self%tangential%road%slides_off) self%reason = pull_outcome(plan, self%tangential)
       end if
-      if (found%passes > 0) call look_at_passes(self, plan, found)
+      if (found%passes > 0) call check_passes(self, plan, found)
    end subroutine judge
 
    !> Check the mismatch that the passes have left. The row has not converged if it is larger than the case
    !> allows. If the case allows a large mismatch, a warning reports it.
-   subroutine look_at_passes(self, plan, found)
+   subroutine check_passes(self, plan, found)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       type(found_step_type), intent(in) :: found
@@ -318,16 +318,16 @@ contains
             call add_warning(self%warnings, self%state%schedule%row, plan%time, message)
          end if
       end associate
-   end subroutine look_at_passes
+   end subroutine check_passes
 
    !> Note that the row has not converged if it contains a number that is not finite.
-   subroutine look_for_overflow(self)
+   subroutine check_finite(self)
       type(simulation_type), intent(inout) :: self
 
       if (all(ieee_is_finite(row_values(self%state%row)))) return
       self%converged = .false.
       self%reason = reason_overflow
-   end subroutine look_for_overflow
+   end subroutine check_finite
 
    !> Free plans and fields.
    subroutine destroy(self)

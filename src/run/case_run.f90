@@ -62,14 +62,14 @@ contains
       self%next_time = 1
       self%last_snapshot = -1
       self%saved_at = seconds_now()
-      call self%files%take_place(trim(case%output%file), restart, overwrite, error)
-      call look_at_memory(case, error)
+      call self%files%lock_place(trim(case%output%file), restart, overwrite, error)
+      call check_memory(case, error)
       if (allocated(error)) return
       call new_simulation(self%sim, case, error)
       call agree(error)
       if (allocated(error)) return
       if (restart) then
-         call take_up(self, error)
+         call resume(self, error)
       else
          call self%files%begin(self%sim, self%rows, error)
       end if
@@ -77,7 +77,7 @@ contains
    end subroutine open_run
 
    !> Check that every machine has the memory that its processes need. Collective.
-   subroutine look_at_memory(case, error)
+   subroutine check_memory(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       type(grid_type) :: grid
@@ -88,14 +88,14 @@ contains
       call need_memory(memory_needed(case, nint(global_max(real(grid%rows(), dp)))), 'the run', error, &
          processes_of_machine())
       call agree(error)
-   end subroutine look_at_memory
+   end subroutine check_memory
 
    !> Continue from the checkpoint.
-   subroutine take_up(self, error)
+   subroutine resume(self, error)
       type(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      call self%files%take_up(self%sim, self%last_snapshot, error)
+      call self%files%resume(self%sim, self%last_snapshot, error)
       if (allocated(error)) return
       self%finished = self%sim%finished
       associate (times => self%sim%case%output%snapshot_times)
@@ -104,7 +104,7 @@ contains
             self%next_time = self%next_time + 1
          end do
       end associate
-   end subroutine take_up
+   end subroutine resume
 
    !> Do a row, and write what is due. A row with the status error_convergence is kept, too. A row that is
    !> abandoned because a stop was requested does not change the run.
@@ -143,7 +143,7 @@ contains
             ' s: the solver did not converge: '//trim(self%sim%reason)//'; residual '// &
             to_text(self%sim%residual)//', allowed '//to_text(self%sim%allowed)
       end associate
-      call self%files%leave_word(outcome, error)
+      call self%files%write_outcome(outcome, error)
       if (.not. allocated(error)) call fail(error, error_convergence, self%files%path//': '//outcome// &
          '; all steps up to this one are kept')
    end subroutine end_unconverged
@@ -213,9 +213,9 @@ contains
       if (self%sim%state%row%step > self%last_snapshot .and. self%sim%state%schedule%row >= 0 .and. &
          .not. self%sim%stop%given_up) call snapshot(self, error, at_stop=.true.)
       if (self%sim%state%schedule%row < 0) then
-         call self%files%leave_word('stopped before the first row', error)
+         call self%files%write_outcome('stopped before the first row', error)
       else
-         call self%files%leave_word('stopped after step '//to_text(self%sim%state%row%step), error)
+         call self%files%write_outcome('stopped after step '//to_text(self%sim%state%row%step), error)
          call self%save(error)
       end if
    end subroutine interrupt_run

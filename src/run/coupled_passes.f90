@@ -190,8 +190,12 @@ contains
       call self%acceleration%forget()
       continues = .not. (plan%instantaneous .or. plan%new_speed)
       call predict(self, contact, plan%dt, motion, continues)
+
+      ! The first pass is likely to leave the mismatch of the first pass of the row before.
       call control%start(contact%case%solver%tolerance, merge(contact%state%first_mismatch, 1.0_dp, continues), &
          self%sharing)
+
+      ! Cells that stick start with an extrapolated traction, and cells that are expected to slip far on their bound.
       if (.not. plan%instantaneous) &
          call contact%tangential%extrapolate(contact%state%tangential, .not. plan%new_speed)
       if (continues) call contact%tangential%expect(contact%state%tangential, self%place)

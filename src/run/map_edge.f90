@@ -14,7 +14,7 @@ module map_edge
    implicit none
    private
 
-   public :: look_at_edge
+   public :: check_edge
 
    real(dp), parameter :: well_below = 0.1_dp     !! least gap of a moving edge over depth or rms height
    real(dp), parameter :: beyond_range = 5.0_dp   !! least gap of a moving edge over the range of adhesion
@@ -22,7 +22,7 @@ module map_edge
 contains
 
    !> Check the cells at the edge: those that enter or leave within a step, and at least one row and column.
-   subroutine look_at_edge(grid, range, rms_height, move, state, message)
+   subroutine check_edge(grid, range, rms_height, move, state, message)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: range                  !! of adhesion, m; 0: there is none
       real(dp), intent(in) :: rms_height             !! of the road, m
@@ -53,7 +53,7 @@ contains
             ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: if it is less than '// &
             to_text(near)//' m, use a larger map')
       end if
-   end subroutine look_at_edge
+   end subroutine check_edge
 
    !> Count the cells that touch in a frame along the edge of the map, and find the least gap there.
    subroutine scan_edge(grid, adhesive, width, state, touching, least)

@@ -37,7 +37,7 @@ module row_stop
       procedure :: keep
       procedure :: keep_more
       procedure :: part_ends
-      procedure :: put_back
+      procedure :: restore
       procedure :: release
    end type row_stop_type
 
@@ -54,13 +54,13 @@ contains
       self%complete = .false.
       if (allocated(self%kept)) deallocate (self%kept)
       if (.not. associated(self%asked)) return
-      call hand_over(state, aside)
-      call hand_over_steady(state, aside)
-      call hand_over_contact(state, aside)
+      call move_step_fields(state, aside)
+      call move_steady_fields(state, aside)
+      call move_contact_fields(state, aside)
       allocate (self%kept, source=state)
-      call hand_over_contact(aside, state)
-      call hand_over_steady(aside, state)
-      call hand_over(aside, state)
+      call move_contact_fields(aside, state)
+      call move_steady_fields(aside, state)
+      call move_step_fields(aside, state)
       status = 0
       if (.not. state%first) then
          allocate (self%kept%pressure, source=state%pressure, stat=status)
@@ -112,19 +112,19 @@ contains
    end subroutine part_ends
 
    !> Return to the state at the start of the row.
-   subroutine put_back(self, state)
+   subroutine restore(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), allocatable, intent(inout) :: state
 
-      if (.not. self%complete) call hand_over(state, self%kept)
-      call hand_over_steady(state, self%kept)
+      if (.not. self%complete) call move_step_fields(state, self%kept)
+      call move_steady_fields(state, self%kept)
       if (self%kept%first) then
-         call hand_over_contact(state, self%kept)
+         call move_contact_fields(state, self%kept)
          self%kept%pressure = 0.0_dp
          self%kept%gap = 0.0_dp
       end if
       call move_alloc(self%kept, state)
-   end subroutine put_back
+   end subroutine restore
 
    !> Free the copies: the row has ended, or can no longer be abandoned.
    subroutine release(self)
@@ -135,15 +135,15 @@ contains
    end subroutine release
 
    !> Move the fields of the contact from one state to another.
-   subroutine hand_over_contact(from, to)
+   subroutine move_contact_fields(from, to)
       type(state_type), intent(inout) :: from, to
 
       call move_alloc(from%pressure, to%pressure)
       call move_alloc(from%gap, to%gap)
-   end subroutine hand_over_contact
+   end subroutine move_contact_fields
 
    !> Move the fields that only the end of a step changes from one state to another.
-   subroutine hand_over(from, to)
+   subroutine move_step_fields(from, to)
       type(state_type), intent(inout) :: from, to
 
       call move_alloc(from%displacement, to%displacement)
@@ -156,11 +156,11 @@ contains
       call move_alloc(from%tangential%arms%s, to%tangential%arms%s)
       call move_alloc(from%tangential%arms%ds, to%tangential%arms%ds)
       call move_alloc(from%tangential%arms%arm, to%tangential%arms%arm)
-   end subroutine hand_over
+   end subroutine move_step_fields
 
    !> Move the states of the last steady rows. A row that is solved in parts is not a steady one, and does not
    !> change them.
-   subroutine hand_over_steady(from, to)
+   subroutine move_steady_fields(from, to)
       type(state_type), intent(inout) :: from, to
 
       call move_alloc(from%steady%last%pressure, to%steady%last%pressure)
@@ -169,6 +169,6 @@ contains
       call move_alloc(from%steady%before%pressure, to%steady%before%pressure)
       call move_alloc(from%steady%before%gap, to%steady%before%gap)
       call move_alloc(from%steady%before%traction, to%steady%before%traction)
-   end subroutine hand_over_steady
+   end subroutine move_steady_fields
 
 end module row_stop

@@ -39,14 +39,14 @@ module run_files
       character(:), allocatable, private :: identity   !! settings that must agree for a restart
       character(:), allocatable, private :: warnings   !! all of the run, one per line
    contains
-      procedure :: take_place
+      procedure :: lock_place
       procedure :: begin
-      procedure :: take_up
+      procedure :: resume
       procedure :: write_row
       procedure :: snapshot
       procedure :: save
       procedure :: note_warnings
-      procedure :: leave_word
+      procedure :: write_outcome
       procedure :: finish
       procedure :: close => close_files
    end type run_files_type
@@ -54,7 +54,7 @@ module run_files
 contains
 
    !> Lock the place of the result and check that it may be written.
-   subroutine take_place(self, path, restart, overwrite, error)
+   subroutine lock_place(self, path, restart, overwrite, error)
       class(run_files_type), intent(inout) :: self
       character(*), intent(in) :: path             !! of the result
       logical, intent(in) :: restart               !! continue from the checkpoint of the result
@@ -65,7 +65,7 @@ contains
       self%warnings = ''
       if (is_first_process()) call check_and_lock(self, restart, overwrite, error)
       call agree(error)
-   end subroutine take_place
+   end subroutine lock_place
 
    !> Check that the result can be written under the name that the case gives, that no other run writes it, and
    !> that no data are lost.
@@ -135,7 +135,7 @@ contains
    end subroutine describe
 
    !> Continue from the checkpoint: read the state, and remove later rows from the result.
-   subroutine take_up(self, sim, last_snapshot, error)
+   subroutine resume(self, sim, last_snapshot, error)
       class(run_files_type), intent(inout) :: self
       type(simulation_type), intent(inout) :: sim
       integer, intent(out) :: last_snapshot        !! row of the last snapshot in the result; -1 if none
@@ -150,12 +150,12 @@ contains
       call load_state(sim, reader, error)
       if (is_first_process()) then
          call reader%close()
-         call take_up_result(self, sim, reader%result_id, error)
+         call resume_result(self, sim, reader%result_id, error)
          if (.not. allocated(error)) last_snapshot = self%result%last_snapshot()
       end if
       call agree(error)
       if (.not. allocated(error)) call share(last_snapshot)
-   end subroutine take_up
+   end subroutine resume
 
    !> Open the checkpoint, and check that it belongs to the case. Only the first process calls this.
    subroutine open_checkpoint(self, sim, reader, error)
@@ -171,7 +171,7 @@ contains
    end subroutine open_checkpoint
 
    !> Open the result, to continue after the last row of the checkpoint. Only the first process calls this.
-   subroutine take_up_result(self, sim, id, error)
+   subroutine resume_result(self, sim, id, error)
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
       character(*), intent(in) :: id               !! of the result that the checkpoint belongs to
@@ -182,8 +182,8 @@ contains
          sim%case%output%compression, error)
       if (allocated(error)) return
       call self%result%write_text('outcome', 'running', error)
-      call take_up_warnings(self, sim, error)
-   end subroutine take_up_result
+      call resume_warnings(self, sim, error)
+   end subroutine resume_result
 
    !> Check that the height map is that of the checkpoint. For maps from files the checksums in the identity ensure
    !> this; a computed map may differ by rounding on another machine.
@@ -208,7 +208,7 @@ contains
    end subroutine compare_map
 
    !> Read the earlier warnings of the run, except those of rows that are computed again.
-   subroutine take_up_warnings(self, sim, error)
+   subroutine resume_warnings(self, sim, error)
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
       type(error_type), allocatable, intent(inout) :: error
@@ -225,7 +225,7 @@ contains
          if (status == 0 .and. step > sim%state%row%step) cycle
          call add_line(self%warnings, line)
       end do
-   end subroutine take_up_warnings
+   end subroutine resume_warnings
 
    !> Write the last row of the history and, if it is one of steady sliding, its losses by wavelength and arm.
    subroutine write_row(self, sim, error)
@@ -294,7 +294,7 @@ contains
    end subroutine note_warnings
 
    !> Write to the result how the run ended, and its warnings.
-   subroutine leave_word(self, outcome, error)
+   subroutine write_outcome(self, outcome, error)
       class(run_files_type), intent(inout) :: self
       character(*), intent(in) :: outcome
       type(error_type), allocatable, intent(inout) :: error
@@ -306,7 +306,7 @@ contains
          call self%result%report(error)            ! the first fault of the two calls above
       end if
       call agree(error)
-   end subroutine leave_word
+   end subroutine write_outcome
 
    !> Finish the result of a complete run, which has no checkpoint any more.
    subroutine finish(self, error)
@@ -323,7 +323,7 @@ contains
          if (.not. allocated(error)) call remove_checkpoint(self%path)
       end if
       call agree(error)
-      call self%leave_word('finished', error)
+      call self%write_outcome('finished', error)
       if (is_first_process()) call self%result%finish(.true., error)
       call agree(error)
    end subroutine finish

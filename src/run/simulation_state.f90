@@ -36,7 +36,7 @@ contains
       table%grid = sim%grid
       call reader%get_state(table, error)
       if (allocated(error)) return
-      call sim%take_up()
+      call sim%resume()
    end subroutine load_state
 
 end module simulation_state

@@ -27,26 +27,26 @@ contains
 
       associate (state => contact%state)
          steady%base = state%steady%base
-         call steady%last%take(state%steady%last)
-         call steady%before%take(state%steady%before)
+         call steady%last%copy(state%steady%last)
+         call steady%before%copy(state%steady%before)
          if (.not. state%steady%now) call steady%begin_curve([state%row%road_x, state%row%road_y])
          call steady%solve(plan, contact%road, found%normal, found%rubbing)
          if (found%normal%stopped) return
          state%steady%now = .true.
          state%steady%base = steady%base
-         call state%steady%last%take(steady%last)
-         call state%steady%before%take(steady%before)
+         call state%steady%last%copy(steady%last)
+         call state%steady%before%copy(steady%before)
       end associate
       found%viscous_force = steady%viscous_force
       found%power_viscous = steady%losses%normal + steady%losses%tangential
       found%power_friction = steady%power_friction
-      call take_place(contact, steady, plan)
-      call take_fields(contact, steady)
-      call take_memory(contact, steady, plan)
+      call set_road(contact, steady, plan)
+      call copy_contact(contact, steady)
+      call set_arms(contact, steady, plan)
    end subroutine slide_for_ever
 
    !> Move the road to the place that belongs to the state.
-   subroutine take_place(contact, steady, plan)
+   subroutine set_road(contact, steady, plan)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(in) :: steady
       type(planned_row_type), intent(inout) :: plan
@@ -59,10 +59,10 @@ contains
          contact%drift = 0.0_dp
          state%moved_cells = nint((steady%place - state%drifted)/[contact%grid%dx, contact%grid%dy])
       end associate
-   end subroutine take_place
+   end subroutine set_road
 
    !> Copy the normal side of the contact to the state.
-   subroutine take_fields(contact, steady)
+   subroutine copy_contact(contact, steady)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(in) :: steady
 
@@ -76,10 +76,10 @@ contains
          state%displacement(:, :) = found%gap + found%height + found%level
          state%first = .false.
       end associate
-   end subroutine take_fields
+   end subroutine copy_contact
 
    !> Copy the tangential side of the contact to the state, without the state of the arms.
-   subroutine take_tractions(tangential, state, found, velocity)
+   subroutine copy_tractions(tangential, state, found, velocity)
       type(tangential_step_type), intent(inout) :: tangential
       type(tangential_state_type), intent(inout) :: state
       type(steady_contact_type), intent(in) :: found
@@ -118,10 +118,10 @@ contains
       state%before(:, :, :) = state%traction
       tangential%trial(:, :, :) = state%displacement
       tangential%slip(:, :, :) = 0.0_dp
-   end subroutine take_tractions
+   end subroutine copy_tractions
 
    !> Set the state of the arms, and the energies.
-   subroutine take_memory(contact, steady, plan)
+   subroutine set_arms(contact, steady, plan)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady
       type(planned_row_type), intent(in) :: plan
@@ -132,13 +132,13 @@ contains
       call steady%remember_normal(next_dt, contact%state%arms, contact%state%books)
       if (contact%frictional) then
          associate (tangential => contact%state%tangential)
-            call take_tractions(contact%tangential, tangential, steady%contact, contact%state%velocity)
+            call copy_tractions(contact%tangential, tangential, steady%contact, contact%state%velocity)
             call steady%remember_tangential(next_dt, tangential%arms, tangential%books)
          end associate
       end if
       call finish_step(contact%material)
       contact%material%dt_old = next_dt
       contact%state%dt_old = next_dt
-   end subroutine take_memory
+   end subroutine set_arms
 
 end module steady_row

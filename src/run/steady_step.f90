@@ -51,7 +51,7 @@ module steady_step
       real(dp), allocatable :: gap(:, :)               !! m
       real(dp), allocatable :: traction(:, :, :)       !! Pa [nx, 2, rows]; no extent without friction
    contains
-      procedure :: take
+      procedure :: copy
    end type steady_start_type
 
    !> The solvers and the last states. A variable of this type must not be copied.
@@ -120,7 +120,7 @@ contains
          end if
          allocate (self%last%pressure, self%last%gap, source=c%pressure)
          allocate (self%last%traction, source=c%traction)
-         call self%before%take(self%last)
+         call self%before%copy(self%last)
       end associate
       if (self%frictional) then
          self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
@@ -134,7 +134,7 @@ contains
 
    !> Copy another start. An assignment would allocate the fields each time, and gfortran does not check whether that
    !> fails.
-   subroutine take(self, other)
+   subroutine copy(self, other)
       class(steady_start_type), intent(inout) :: self
       type(steady_start_type), intent(in) :: other
 
@@ -148,7 +148,7 @@ contains
       self%pressure(:, :) = other%pressure
       self%gap(:, :) = other%gap
       self%traction(:, :, :) = other%traction
-   end subroutine take
+   end subroutine copy
 
    !> Discard the states of earlier rows, and set the displacement of the road for the next steady row.
    subroutine begin_curve(self, place)
@@ -272,7 +272,7 @@ contains
       type(steady_step_type), intent(inout) :: self
       real(dp), intent(in) :: target
 
-      if (self%last%known) call self%before%take(self%last)
+      if (self%last%known) call self%before%copy(self%last)
       self%last%known = .true.
       self%last%pressure_mean = target
       self%last%velocity = self%medium%velocity

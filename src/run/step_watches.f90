@@ -4,7 +4,7 @@ module step_watches
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
    use contact_size, only : measured_patches, watch_contact_size
-   use map_edge, only : look_at_edge
+   use map_edge, only : check_edge
    use stick_slip_watch, only : watch_slip
    use text_tools, only : add_line, to_text
    implicit none
@@ -23,7 +23,7 @@ contains
       character(:), allocatable :: message
 
       message = ''
-      call look_at_edge(contact%grid, merge(contact%case%adhesion%range, 0.0_dp, contact%side%adhesive), &
+      call check_edge(contact%grid, merge(contact%case%adhesion%range, 0.0_dp, contact%side%adhesive), &
          contact%rms_height, plan%road - [contact%state%row%road_x, contact%state%row%road_y], contact%state, message)
       call add_warning(warnings, contact%state%schedule%row, plan%time, message)
    end subroutine watch_edge

@@ -25,7 +25,7 @@ module adhesion_method
          import :: adhesion_contact_type, adhesion_method_type, solver_result_type
          implicit none
          class(adhesion_method_type), intent(inout), target :: self
-         !> In: the problem, its fields, and the start; out: gap, pressure and level of the solution.
+         !> On entry it has the problem, its fields and the start; on return gap, pressure and level of the solution.
          type(adhesion_contact_type), intent(inout) :: contact
          type(solver_result_type), intent(out) :: outcome
       end subroutine solve_contact

@@ -1,7 +1,7 @@
 !> The states of a cell in the joint equations of a step with friction, in one number per cell.
 !>
 !> A cell is open, or it touches without pressure in a part of its area, or it is in contact. The number
-!> s, a length, determines the state and its ranges are
+!> s, a length, determines the state:
 !>
 !>     s < 0              open: the gap is -s, no pressure but that of adhesion, no traction
 !>     0 <= s <= width    touches: no gap, no pressure of the wall, the share s/width of the bound

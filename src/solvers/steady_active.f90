@@ -32,7 +32,7 @@ contains
       real(dp), intent(in) :: cells_in_contact, cells
       integer, intent(in) :: transforms                !! real transforms since the solve began
       logical :: cheap
-      !> Measured: in the time of a transform over its n log2(n), a factorisation does this number of its m^3.
+      !> m^3 of a factorisation over n log2(n) of a transform that takes the same time. The value was measured.
       real(dp), parameter :: factoring = 3.0_dp
       real(dp), parameter :: part = 0.25_dp            !! largest time of a factorisation over the time so far
       real(dp), parameter :: fields = 16.0_dp          !! largest memory of the matrix, in fields
