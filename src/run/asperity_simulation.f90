@@ -22,13 +22,13 @@ module asperity_simulation
    use coupling_advice, only : advice_on_passes
    use finite_fields, only : reason_overflow
    use history_table, only : row_values
-   use pulled_road, only : guess_road, pull_outcome, take_road, watch_motion
+   use pulled_road, only : guess_road, pull_outcome, place_pulled_road, watch_motion
    use rising_clock, only : seconds_now
    use road_motion, only : move_road
    use row_account, only : account, found_step_type
    use row_state, only : state_type
    use starting_steps, only : part_sums_type, split_start
-   use steady_row, only : slide_for_ever
+   use steady_row, only : solve_steady_row
    use steady_step, only : new_steady_step, steady_step_type
    use step_watches, only : add_warning, watch_cells, watch_edge, watch_stick_slip
    use text_tools, only : to_text
@@ -246,7 +246,7 @@ contains
 
       found%rubbing%converged = .true.
       if (plan%steady) then
-         call slide_for_ever(self, self%steady, plan, found)
+         call solve_steady_row(self, self%steady, plan, found)
          self%stop%given_up = found%normal%stopped
          return
       end if
@@ -269,7 +269,7 @@ contains
             if (self%stop%given_up) return
          end if
          if (self%frictional) then
-            call take_road(plan, state%schedule, self%tangential, self%rubs(), road, state%velocity)
+            call place_pulled_road(plan, state%schedule, self%tangential, self%rubs(), road, state%velocity)
             call watch_motion(plan, self%grid, road, state%motion_reported, message)
             call add_warning(self%warnings, state%schedule%row, plan%time, message)
          end if

@@ -250,7 +250,7 @@ contains
       normal%stopped = part%stopped
       if (normal%stopped) return
       call add_result(normal, part)
-      if (self%sharing) call take_shares(self, contact)
+      if (self%sharing) call update_shares(self, contact)
       contact%tangential%tolerance = accuracy
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
@@ -260,7 +260,7 @@ contains
    end subroutine do_pass
 
    !> Compute the shares for the tangential solve of a pass from the result of its normal solve, and their residual.
-   subroutine take_shares(self, contact)
+   subroutine update_shares(self, contact)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
 
@@ -273,7 +273,7 @@ contains
          call self%edge%move(contact%state%pressure, contact%state%gap, contact%tangential%share)
       end if
       self%place_residual(:, 3, :) = self%edge%share_length*contact%tangential%share - self%place(:, 3, :)
-   end subroutine take_shares
+   end subroutine update_shares
 
    !> Compute the first place of a row: the displacement of the row before, moved along with the contact, which
    !> follows the road over the rubber, plus the mean motion of the rubber's surface, plus the forecast of module

@@ -49,7 +49,7 @@ contains
             end if
             ! The slip of a point that sticks is an error within the tolerance of the solver, and causes no loss.
             if (state%contact(i, j) /= 1_int8) rows(1, j) = rows(1, j) &
-               + rubbed_off(state%rubbed(i, j) == 1_int8, state%rubbing(i, :, j), rubbing, slip(i, :, j))
+               + friction_loss(state%rubbed(i, j) == 1_int8, state%rubbing(i, :, j), rubbing, slip(i, :, j))
             state%rubbing(i, :, j) = rubbing
             state%rubbed(i, j) = state%contact(i, j)
          end do
@@ -62,7 +62,7 @@ contains
    !> the slip. A cell that enters or leaves the contact has no traction at one end. A cell that stuck at the start slips
    !> only after its traction has reached the bound, so that only the traction at the end counts. The same holds if
    !> the slip is opposed to the traction of the start, because the cell must have stuck in between.
-   pure function rubbed_off(stuck, before, after, slip) result(loss)
+   pure function friction_loss(stuck, before, after, slip) result(loss)
       logical, intent(in) :: stuck                    !! at the start of the step
       real(dp), intent(in) :: before(2)               !! T - T* at the start of the step, Pa
       real(dp), intent(in) :: after(2)                !! and at its end, Pa
@@ -73,6 +73,6 @@ contains
       loss = max(dot_product(after, slip), 0.0_dp)
       first = dot_product(before, slip)
       if (first >= 0.0_dp .and. .not. stuck) loss = 0.5_dp*(first + loss)
-   end function rubbed_off
+   end function friction_loss
 
 end module friction_books

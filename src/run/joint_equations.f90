@@ -94,7 +94,7 @@ contains
          rules%soft = self%compliance/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
          touching = state%tangential%contact /= 0_int8
-         call self%take_units(touching, state%pressure, contact%rms_slope)
+         call self%choose_units(touching, state%pressure, contact%rms_slope)
          self%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
          begun%s(:, :) = rules%number_of(self%width, touching, state%pressure, state%gap)
          do c = 1, 2

@@ -12,7 +12,7 @@ module pulled_road
    implicit none
    private
 
-   public :: drive_direction, guess_road, pull_outcome, take_road, watch_motion
+   public :: drive_direction, guess_road, pull_outcome, place_pulled_road, watch_motion
 
 contains
 
@@ -41,7 +41,7 @@ contains
    end subroutine guess_road
 
    !> Set the position of the road to the one that was computed.
-   subroutine take_road(plan, schedule, tangential, moved, road, velocity)
+   subroutine place_pulled_road(plan, schedule, tangential, moved, road, velocity)
       type(planned_row_type), intent(inout) :: plan
       type(schedule_type), intent(inout) :: schedule
       type(tangential_step_type), intent(inout) :: tangential
@@ -52,14 +52,14 @@ contains
 
       if (.not. any(plan%pulled)) return
       motion = 0.0_dp
-      if (moved) call tangential%take_motion(motion)
+      if (moved) call tangential%correct_motion(motion)
       if (plan%dt > 0.0_dp) velocity = merge(motion/plan%dt, velocity, plan%pulled)
       where (plan%pulled)
          plan%road = road + motion
          schedule%start_road = plan%road
          plan%velocity = velocity
       end where
-   end subroutine take_road
+   end subroutine place_pulled_road
 
    !> Warn, once in a run, if a pull moves the road so far in a step that the contact is not resolved in time. For a road
    !> that is driven, module `case_phases` checks this before the run.

@@ -16,7 +16,7 @@ module steady_memory
    implicit none
    private
 
-   public :: book_memory, remember_field
+   public :: set_books, set_arm_state
 
    integer, parameter :: whole = 0           !! response of S; k > 0: of arm k
    integer, parameter :: increment = -1      !! response of S - S_old
@@ -24,7 +24,7 @@ module steady_memory
 contains
 
    !> Set the state of the arms for one component of a field of tractions.
-   subroutine remember_field(operator, medium, dt, field, component, arms)
+   subroutine set_arm_state(operator, medium, dt, field, component, arms)
       type(steady_operator_type), intent(inout) :: operator
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
@@ -75,7 +75,7 @@ contains
          call operator%apply_table(table, field, result)
       end subroutine respond
 
-   end subroutine remember_field
+   end subroutine set_arm_state
 
    !> G* of a mode, at the first of the wave vectors that it represents.
    pure function mode_modulus(medium, i, j) result(modulus)
@@ -127,7 +127,7 @@ contains
    end function arm_ratio
 
    !> Set the stored energy, and the sums that the books keep from the last step.
-   subroutine book_memory(medium, dt, p, t, books)
+   subroutine set_books(medium, dt, p, t, books)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
       complex(dp), intent(in) :: p(0:, medium%grid%first_row - 1:)      !! transform of the pressure, or of no extent
@@ -154,7 +154,7 @@ contains
       area = medium%grid%area()
       call book_state(books, medium%modulus, medium%g, area*total(1), area*total(2), &
          area*total(3:2 + arms), area*total(3 + arms:))
-   end subroutine book_memory
+   end subroutine set_books
 
    !> Form the sums over the modes of a row, per area: U.S, dU.dS, and for each arm m_k.p_k and p_k.dU.
    subroutine row_products(medium, dt, j, sums, p, t)

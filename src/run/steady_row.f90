@@ -14,12 +14,12 @@ module steady_row
    implicit none
    private
 
-   public :: slide_for_ever
+   public :: solve_steady_row
 
 contains
 
    !> Find the state of the row, and replace the state before by it. A solve that was stopped leaves the state unchanged.
-   subroutine slide_for_ever(contact, steady, plan, found)
+   subroutine solve_steady_row(contact, steady, plan, found)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady
       type(planned_row_type), intent(inout) :: plan      !! out: the road is where the contact of the state stands on it
@@ -43,7 +43,7 @@ contains
       call set_road(contact, steady, plan)
       call copy_contact(contact, steady)
       call set_arms(contact, steady, plan)
-   end subroutine slide_for_ever
+   end subroutine solve_steady_row
 
    !> Move the road to the place that belongs to the state.
    subroutine set_road(contact, steady, plan)

@@ -31,7 +31,7 @@ module steady_step
    use steady_contact, only : sliding_outcome_type, steady_contact_type
    use steady_friction, only : new_steady_friction, steady_friction_type
    use steady_losses, only : steady_losses_type, sum_losses
-   use steady_memory, only : book_memory, remember_field
+   use steady_memory, only : set_books, set_arm_state
    use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : new_steady_operator, steady_operator_type
    use steady_symbols, only : medium_type, new_steady_symbols, steady_symbols_type
@@ -225,7 +225,7 @@ contains
 
       problem%warm = self%last%known
       if (.not. problem%warm) return
-      part = onward(self, problem%target)
+      part = extrapolation(self, problem%target)
       associate (c => self%contact, a => self%last, b => self%before)
          scale = field_sum(a%pressure)/max(field_sum(a%gap), field_sum(b%gap), tiny(1.0_dp))
          do j = 1, self%grid%rows()
@@ -245,7 +245,7 @@ contains
    end subroutine start_from
 
    !> The distance of an extrapolation along the line through the last two states, over that of both; 0: none.
-   pure function onward(self, target) result(part)
+   pure function extrapolation(self, target) result(part)
       type(steady_step_type), intent(in) :: self
       real(dp), intent(in) :: target                   !! mean pressure of the row, Pa
       real(dp) :: part
@@ -265,7 +265,7 @@ contains
          part = (load(3) - load(2))/(load(2) - load(1))
       end if
       if (abs(part) > farthest) part = 0.0_dp
-   end function onward
+   end function extrapolation
 
    !> Keep the state of the row for the next ones.
    subroutine keep_state(self, target)
@@ -348,8 +348,8 @@ contains
       type(energy_books_type), intent(inout) :: books
       complex(dp) :: none(0:-1, 0:-1, 2)
 
-      call remember_field(self%operator, self%medium, dt, self%contact%pressure, 1, arms)
-      call book_memory(self%medium, dt, self%p_modes, none, books)
+      call set_arm_state(self%operator, self%medium, dt, self%contact%pressure, 1, arms)
+      call set_books(self%medium, dt, self%p_modes, none, books)
    end subroutine remember_normal
 
    !> Do the same for the tangential side.
@@ -362,9 +362,9 @@ contains
       integer :: c
 
       do c = 1, 2
-         call remember_field(self%operator, self%medium, dt, self%contact%traction(:, c, :), c, arms)
+         call set_arm_state(self%operator, self%medium, dt, self%contact%traction(:, c, :), c, arms)
       end do
-      call book_memory(self%medium, dt, none, self%t_modes, books)
+      call set_books(self%medium, dt, none, self%t_modes, books)
    end subroutine remember_tangential
 
    !> Free plans and memory.

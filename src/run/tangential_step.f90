@@ -66,7 +66,7 @@ module tangential_step
       procedure :: solve
       procedure :: try
       procedure :: cell_compliance
-      procedure :: take_motion
+      procedure :: correct_motion
       procedure :: commit
       procedure :: sums
       procedure :: destroy
@@ -179,7 +179,7 @@ contains
 
    !> Correct the displacements of a solved step for the motion of the pulled road, because they were computed with a
    !> guess of this motion.
-   subroutine take_motion(self, motion)
+   subroutine correct_motion(self, motion)
       class(tangential_step_type), intent(inout) :: self
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
       integer :: c, j
@@ -193,7 +193,7 @@ contains
          end do
       end do
       self%motion = motion
-   end subroutine take_motion
+   end subroutine correct_motion
 
    !> Extrapolate the traction: the step starts as if the change of the last step continued. This must be called exactly
    !> one time per step, after the road has moved.
@@ -234,7 +234,7 @@ contains
 
    !> Solve for T under a pressure, and compute the trial displacement and the slip. Where the road is pulled,
    !> the trial displacement belongs to the guessed motion of the road. The difference U - (D' - D) is right,
-   !> and only this difference is used to read the road. `take_motion` corrects the displacement in the end.
+   !> and only this difference is used to read the road. `correct_motion` corrects the displacement in the end.
    subroutine solve(self, state, pressure, gap, slope_x, slope_y, outcome)
       class(tangential_step_type), intent(inout), target :: self
       type(tangential_state_type), intent(inout), target :: state

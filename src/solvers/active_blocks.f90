@@ -194,10 +194,10 @@ contains
       holds(:, :) = on_any_process(holds)
       rim = merge(self%far_rim, self%rim, far)
       do j = 1, rows
-         stretched(:, j) = grown(holds(:, j), rim(1))
+         stretched(:, j) = dilated(holds(:, j), rim(1))
       end do
       do b = 1, blocks
-         holds(b, :) = grown(stretched(b, :), rim(2))
+         holds(b, :) = dilated(stretched(b, :), rim(2))
       end do
       !$omp parallel do default(none) shared(self, search, holds, blocks) &
       !$omp private(b, j, k, first, last, n, now, before) num_threads(self%threads)
@@ -228,14 +228,14 @@ contains
    contains
 
       !> The blocks of a line that are set, or are close enough to one that is.
-      pure function grown(line, distance)
+      pure function dilated(line, distance)
          logical, intent(in) :: line(:)
          integer, intent(in) :: distance
-         logical :: grown(size(line))
+         logical :: dilated(size(line))
          integer :: b, k, turns, left, right, length
 
          ! The blocks since the last one that is set, in both directions; a periodic line is passed twice.
-         grown = line
+         dilated = line
          length = size(line)
          turns = merge(2, 1, self%periodic)
          left = distance
@@ -243,12 +243,12 @@ contains
          do k = 1, turns*length
             b = 1 + modulo(k - 1, length)
             left = merge(0, left + 1, line(b))
-            if (left <= distance) grown(b) = .true.
+            if (left <= distance) dilated(b) = .true.
             b = length + 1 - b
             right = merge(0, right + 1, line(b))
-            if (right <= distance) grown(b) = .true.
+            if (right <= distance) dilated(b) = .true.
          end do
-      end function grown
+      end function dilated
 
    end subroutine list_wide_runs
 

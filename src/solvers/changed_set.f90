@@ -49,7 +49,7 @@ module changed_set
       integer, private :: used = 0                     !! changed cells
    contains
       procedure :: refresh
-      procedure :: crowded
+      procedure :: is_full
       procedure :: solve
       procedure :: leave
       procedure :: join
@@ -104,7 +104,7 @@ contains
       !$omp parallel do default(none) shared(self, n) private(a, b) num_threads(self%threads)
       do b = 1, n
          do a = 1, n
-            self%matrix(a, b) = entry_here(self, self%cells(:, a), self%cells(:, b))
+            self%matrix(a, b) = local_entry(self, self%cells(:, a), self%cells(:, b))
          end do
       end do
       if (self%grid%shared) then
@@ -164,7 +164,7 @@ contains
    end subroutine set_number
 
    !> Displacement of one cell under the pressure of another. Only one process knows it; it is zero on all others.
-   pure function entry_here(self, at, by) result(displacement)
+   pure function local_entry(self, at, by) result(displacement)
       type(changed_set_type), intent(in) :: self
       integer, intent(in) :: at(2), by(2)
       real(dp) :: displacement
@@ -173,15 +173,15 @@ contains
       d = modulo(at - by, [self%grid%nx, self%grid%ny]) + 1
       displacement = 0.0_dp
       if (has_row(self, d(2))) displacement = self%kernel(d(1), d(2) - self%grid%first_row + 1)
-   end function entry_here
+   end function local_entry
 
    !> Have more cells changed than there are columns for?
-   pure function crowded(self) result(full)
+   pure function is_full(self) result(full)
       class(changed_set_type), intent(in) :: self
       logical :: full
 
       full = self%used >= size(self%changed, 2)
-   end function crowded
+   end function is_full
 
    !> Remove cells from the set.
    subroutine leave(self, leaving, cells)
@@ -219,7 +219,7 @@ contains
          do k = self%used, 1, -1
             if (all(self%changed(:, k) == cell)) exit
          end do
-         if (k == 0 .and. (origin > 0 .neqv. joins) .and. .not. self%crowded()) then
+         if (k == 0 .and. (origin > 0 .neqv. joins) .and. .not. self%is_full()) then
             call add_column(self, cell, origin, listed(4, m))
             k = self%used
          end if
@@ -247,7 +247,7 @@ contains
       else
          call set_number(self, cell, -n)
          do a = 1, size(self%cells, 2)
-            self%columns(a, n) = -entry_here(self, self%cells(:, a), cell)
+            self%columns(a, n) = -local_entry(self, self%cells(:, a), cell)
          end do
          if (self%grid%shared) self%columns(:, n) = global_sum(self%columns(:, n))
       end if
@@ -339,10 +339,10 @@ contains
          end if
          allocate (displacement(n + size(active)))
          do b = 1, n
-            displacement(b) = entry_here(self, cell, self%cells(:, b))
+            displacement(b) = local_entry(self, cell, self%cells(:, b))
          end do
          do b = 1, size(active)
-            displacement(n + b) = entry_here(self, cell, self%changed(:, active(b)))
+            displacement(n + b) = local_entry(self, cell, self%changed(:, active(b)))
          end do
          if (self%grid%shared) displacement = global_sum(displacement)
          do b = 1, size(active)

@@ -163,7 +163,7 @@ contains
          if (self%method%stopped) exit
          result%converged = problem%solved(self%tolerance)
          if (result%converged .and. any(self%pull%along)) &
-            call meet_pull(self, problem, operator, result%iterations, result%converged)
+            call match_pull(self, problem, operator, result%iterations, result%converged)
          if (problem%fresh .or. .not. result%converged) exit
 
          call problem%refresh_slip(operator)
@@ -228,7 +228,7 @@ contains
    !> it supplies. Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`)
    !> if a move gained little. If nothing is gained in full slip, the pull exceeds the friction, and the road returns to
    !> where the springs began.
-   subroutine meet_pull(self, problem, operator, iterations, converged)
+   subroutine match_pull(self, problem, operator, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
@@ -261,7 +261,7 @@ contains
          end if
          factor = max(1.0_dp, min(10.0_dp*factor, factor/max(gained, 0.01_dp)))
       end do
-   end subroutine meet_pull
+   end subroutine match_pull
 
    !> Move the ends of the springs by a distance, and solve the contact again.
    subroutine move_springs(self, problem, operator, shift, iterations)

@@ -257,7 +257,7 @@ contains
       self%fresh = .true.
       call self%spring%follow(self%traction)
       call operator%columns(columns_apply)
-      call take_slip(self, operator, 1.0_dp)
+      call finish_slip(self, operator, 1.0_dp)
    end subroutine update_slip
 
    !> Update r = r - step A d, after the columns of the transform have been done for d, and measure it.
@@ -268,11 +268,11 @@ contains
 
       self%fresh = .false.
       call self%spring%follow(self%traction)
-      call take_slip(self, operator, step)
+      call finish_slip(self, operator, step)
    end subroutine advance_slip
 
    !> Transform all rows back, update r and measure it. `update_slip` and `advance_slip` share this.
-   subroutine take_slip(self, operator, factor)
+   subroutine finish_slip(self, operator, factor)
       type(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: factor
@@ -283,14 +283,14 @@ contains
       !$omp parallel do default(none) shared(self, operator, factor, rows) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
-         call take_slip_row(self, operator, factor, j)
+         call finish_slip_row(self, operator, factor, j)
          call measure_row(self, j, rows(j))
       end do
       call finish_measure(self, rows)
-   end subroutine take_slip
+   end subroutine finish_slip
 
    !> Update one row of r from the inverse transform: r = DX + c - u, or r = r - factor u.
-   subroutine take_slip_row(self, operator, factor, j)
+   subroutine finish_slip_row(self, operator, factor, j)
       type(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: factor
@@ -306,7 +306,7 @@ contains
             self%slip(:, c, j) = self%slip(:, c, j) + self%spring%offset_step(c) - factor*u
          end if
       end do
-   end subroutine take_slip_row
+   end subroutine finish_slip_row
 
    !> Set r = DX + c without a product, because T is zero everywhere.
    subroutine start_from_rest(self)

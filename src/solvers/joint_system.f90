@@ -52,7 +52,7 @@ module joint_system
       procedure(evaluate_state), deferred :: evaluate
       procedure :: renew
       procedure :: improve
-      procedure :: take_units
+      procedure :: choose_units
    end type joint_system_type
 
    abstract interface
@@ -108,7 +108,7 @@ contains
    end subroutine improve
 
    !> Choose the units and the width of the second range for a contact from which the solution starts.
-   subroutine take_units(self, touching, pressure, rms_slope)
+   subroutine choose_units(self, touching, pressure, rms_slope)
       class(joint_system_type), intent(inout) :: self
       logical, intent(in) :: touching(:, :)
       real(dp), intent(in) :: pressure(:, :)           !! Pa
@@ -125,6 +125,6 @@ contains
          rules%width = rules%soft_along*slope*self%unit_traction
          if (rules%law%jumps_at_edge()) rules%width = rules%soft_along*slope*rules%law%bare_strength()
       end associate
-   end subroutine take_units
+   end subroutine choose_units
 
 end module joint_system

@@ -102,7 +102,7 @@ contains
       if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
          call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
       beta = 0.0_dp
-      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = old_part(work, before, rz, now%rz)
+      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, before, rz, now%rz)
       now%rz = rz
       now%slope = 0.0_dp
       if (now%phase /= phase_plain) then
@@ -124,7 +124,7 @@ contains
    !> the conjugacy of the directions, it never recovers: each direction then consists mostly of the old ones, and r.z
    !> falls by a half instead of a tenth in each iteration. What r.z contains of the residual before is therefore left
    !> out (Polak and Ribiere's beta) where beta is so large.
-   function old_part(work, before, rz, rz_before) result(beta)
+   function conjugacy_factor(work, before, rz, rz_before) result(beta)
       type(normal_work_type), intent(in) :: work
       real(dp), contiguous, intent(in) :: before(:, :)
       real(dp), intent(in) :: rz, rz_before
@@ -138,7 +138,7 @@ contains
          overlap = max(overlap_with(work, before), 0.0_dp)
       end if
       beta = max(rz - overlap, 0.0_dp)/rz_before
-   end function old_part
+   end function conjugacy_factor
 
    !> Do so many cells touch that the mean pressure at a given approach depends on the few open ones? Module
    !> `wave_preconditioner` takes care of that itself.

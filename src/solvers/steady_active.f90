@@ -96,7 +96,7 @@ contains
       integer :: departure, leaving
 
       do departure = 1, most_departures
-         if (set%crowded()) then
+         if (set%is_full()) then
             if (set%factors >= most_factors) exit
             call set%refresh()
          end if

@@ -239,7 +239,7 @@ contains
          call find_softness(system%operator, rules%soft, rules%soft_along)
          call system%inverse%begin(system%operator)
          slope = sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2))
-         call system%take_units(touching, contact%pressure, slope)
+         call system%choose_units(touching, contact%pressure, slope)
          system%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
          begun%s(:, :) = rules%number_of(system%width, touching, contact%pressure, contact%gap)
          do c = 1, 2
