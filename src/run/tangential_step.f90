@@ -195,8 +195,8 @@ contains
       self%motion = motion
    end subroutine correct_motion
 
-   !> Extrapolate the traction: the step starts as if the change of the last step continued. This must be called exactly
-   !> one time per step, after the road has moved.
+   !> Extrapolate the traction: the step starts as if the change of the last step continued. This must be called
+   !> exactly once per step, after the road has moved.
    subroutine extrapolate(self, state, steady)
       class(tangential_step_type), intent(inout) :: self
       type(tangential_state_type), intent(inout) :: state

@@ -26,8 +26,8 @@ module adhesion_work
       ! The contact in the local model of its energy:
       real(dp), pointer, contiguous :: model_state(:, :) => null()
       real(dp), pointer, contiguous :: model_traction(:, :) => null()
-      !> Change of the displacement, or its correction where gaps were closed. Rows of other processes that the stencil
-      !> needs follow the own ones.
+      !> Change of the displacement, or its correction where gaps were closed. The rows of other processes that the
+      !> stencil needs follow those of this process.
       real(dp), allocatable :: change(:, :)
       logical, allocatable :: has_correction(:)      !! is the correction in a row of `change` not zero?
       real(dp), allocatable :: image(:, :)           !! product of `change` with B_h, or of the step with B

@@ -190,7 +190,7 @@ contains
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
       integer, intent(in) :: j
-      type(z_sums_type), intent(inout) :: sums     !! in: with g.z_old
+      type(z_sums_type), intent(inout) :: sums     !! on entry with g.z_old
 
       call self%inverse%backward_row(1, j, self%z(:, 1, j))
       call self%inverse%backward_row(2, j, self%z(:, 2, j))
