@@ -239,7 +239,7 @@ contains
       call check_close(fields_of(case), 13.15_dp, 1.0e-9_dp, 'memory: sliding')
       call check_close(joint_memory(case), 0.0_dp, 0.0_dp, 'memory: nothing more without steady rows and friction')
       case%phases(3)%steady = .true.
-      call check_close(joint_memory(case), 88.0_dp*8*64*32, 1.0e-9_dp, 'memory: a steady row solved all at once')
+      call check_close(joint_memory(case), 111.0_dp*8*64*32, 1.0e-9_dp, 'memory: a steady row solved all at once')
       case%friction%law = 'coulomb'
       call check_close(joint_memory(case), 275.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
       case%friction%law = 'none'

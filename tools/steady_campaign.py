@@ -57,6 +57,8 @@ def road(rng: np.random.Generator, nx: int, ny: int, lx: float, ly: float) -> np
     allowed = (wave > 0) & (wave <= max(1 / shortest, np.sort(wave[wave > 0])[0]))
     amplitude = np.where(allowed, np.where(allowed, wave, 1.0) ** -rng.uniform(1.5, 2.5), 0.0)
     height = np.fft.ifft2(amplitude * np.exp(2j * np.pi * rng.random((ny, nx)))).real
+    if rng.random() < 0.3:
+        height = np.minimum(height, height.mean() + rng.uniform(0, 1) * height.std())
     spectrum = np.fft.fft2(height)
     square = sum(np.mean(np.fft.ifft2(2j * np.pi * w * spectrum).real ** 2)
                  for w in (fx[None, :] / lx, fy[:, None] / ly))

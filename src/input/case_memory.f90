@@ -5,7 +5,7 @@
 !> `tools/bench/memory.py` compares the estimate with the peak of runs, which differs by less than a tenth.
 !> A dense system for few cells in contact (module `steady_active`) is not counted; it takes at most 20 fields
 !> while it is solved. A step or a steady row may have to be solved all at once (modules `joint_step`,
-!> `steady_joint`, and `steady_newton` without friction). How much memory this takes depends on its course, and
+!> `steady_joint`, and `steady_proximal` without friction). How much memory this takes depends on its course, and
 !> without this memory the run continues in another way. `joint_memory` therefore returns separately the most that
 !> it may take.
 module case_memory
@@ -22,7 +22,7 @@ module case_memory
    !> all cells touch.
    real(dp), parameter :: joint_fields = 30.0_dp, joint_directions = 180.0_dp
    !> The same of a steady row without friction.
-   real(dp), parameter :: newton_fields = 8.0_dp, newton_directions = 30.0_dp
+   real(dp), parameter :: newton_fields = 11.0_dp, newton_directions = 50.0_dp
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
    !> Further fields of a steady row: the approximate inverse, and the last two states on a path of solutions.
    real(dp), parameter :: path_fields = 15.0_dp

@@ -97,9 +97,10 @@ contains
    end function box_at
 
    !> Prepare for another set of cells in contact.
-   subroutine renew(self, cells)
+   subroutine renew(self, cells, spring)
       class(contact_boxes_type), intent(inout) :: self
       integer, intent(in) :: cells(:, :)         !! in contact, column and row of the grid [2, n]
+      real(dp), intent(in) :: spring             !! compliance of a spring on each cell, m/Pa
       integer :: number(self%boxes(1), self%boxes(2)), places(2, product(self%boxes))
       integer :: a, at(2), b, k, n
 
@@ -126,7 +127,8 @@ contains
             at = modulo(places(:, a) - places(:, b), self%boxes) + 1
             self%matrix(a, b) = self%kernel(at(1), at(2))
          end do
-         self%matrix(b, b) = self%matrix(b, b)*product(real(self%cells, dp)/self%boxes)/self%count(b)
+         self%matrix(b, b) = self%matrix(b, b)*product(real(self%cells, dp)/self%boxes)/self%count(b) &
+            + spring/self%count(b)
       end do
       call factor(self%matrix, 1)
    end subroutine renew

@@ -39,7 +39,8 @@ module contact_tiles
       integer, private :: tiles(2) = 0
       integer, private :: threads = 1
       logical, private :: shared = .false.       !! processes share the rows
-      real(dp), private :: soft = 0.0_dp         !! displacement of a cell under its own unit pressure, m/Pa
+      real(dp) :: soft = 0.0_dp                  !! displacement of a cell under its own unit pressure, m/Pa
+      real(dp), private :: spring = 0.0_dp       !! compliance of a spring on each cell, m/Pa
       real(sp), private :: near(-reach:reach, -reach:reach) = 0.0_sp   !! K over `soft`
       type(tile_type), allocatable, private :: tile(:)
    contains
@@ -81,13 +82,17 @@ contains
    end subroutine begin
 
    !> Prepare for another set of cells in contact.
-   subroutine renew(self, number)
+   subroutine renew(self, number, spring)
       class(contact_tiles_type), intent(inout) :: self
       integer, intent(in) :: number(:, :)        !! of each cell of the grid in the list of cells in contact; 0: open
+      real(dp), intent(in) :: spring             !! compliance of a spring on each cell, m/Pa
       integer :: full(side, side)                !! the first tile of this size whose cells are all in contact
       logical :: changed(size(self%tile))
       integer :: area(2), extent(2), t
+      logical :: other
 
+      other = abs(spring - self%spring) > 0.0_dp
+      self%spring = spring
       !$omp parallel do default(none) shared(self, number, changed) private(t) num_threads(self%threads)
       do t = 1, size(self%tile)
          changed(t) = .false.
@@ -106,11 +111,11 @@ contains
          end associate
       end do
 
-      !$omp parallel do default(none) shared(self, changed) private(t) schedule(dynamic) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, changed, other) private(t) schedule(dynamic) num_threads(self%threads)
       do t = 1, size(self%tile)
          if (.not. is_mine(self, t)) cycle
          associate (tile => self%tile(t))
-            if (allocated(tile%inverse) .and. (changed(t) .or. tile%twin > 0)) deallocate (tile%inverse)
+            if (allocated(tile%inverse) .and. (changed(t) .or. other .or. tile%twin > 0)) deallocate (tile%inverse)
             if (tile%own > 0 .and. tile%twin == 0 .and. .not. allocated(tile%inverse)) call invert_tile(self, tile)
          end associate
       end do
@@ -194,6 +199,7 @@ contains
             d = tile%places(:, a) - tile%places(:, b)
             matrix(a, b) = self%near(d(1), d(2))
          end do
+         matrix(b, b) = matrix(b, b) + real(self%spring/self%soft, sp)
       end do
       call invert(matrix)
       allocate (tile%inverse(tile%own, size(matrix, 2)), stat=status)
@@ -248,7 +254,7 @@ contains
       integer :: b
 
       if (.not. allocated(twin%inverse)) then
-         pressure(tile%numbers(:tile%own)) = wanted(tile%numbers(:tile%own))/self%soft
+         pressure(tile%numbers(:tile%own)) = wanted(tile%numbers(:tile%own))/(self%soft + self%spring)
          return
       end if
       here = real(wanted(tile%numbers)*(1.0_dp/self%soft), sp)

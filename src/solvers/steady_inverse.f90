@@ -37,6 +37,7 @@ module steady_inverse
       procedure :: begin
       procedure :: renew
       procedure :: solve
+      procedure :: softness
    end type contact_inverse_type
 
 contains
@@ -63,14 +64,19 @@ contains
    end subroutine begin
 
    !> Prepare for another set of cells.
-   subroutine renew(self, inside)
+   subroutine renew(self, inside, spring)
       class(contact_inverse_type), intent(inout) :: self
       logical, intent(in) :: inside(:, :)
+      real(dp), intent(in), optional :: spring         !! compliance of a spring on each cell, m/Pa
+      real(dp) :: added
+
+      added = 0.0_dp
+      if (present(spring)) added = spring
 
       self%inside(:, :) = inside
       call list_cells(self)
-      call self%tiles%renew(self%number)
-      call self%boxes%renew(self%cells)
+      call self%tiles%renew(self%number, added)
+      call self%boxes%renew(self%cells, added)
       self%lift(:, :) = merge(1.0_dp, 0.0_dp, inside)
       call invert(self, self%lift)
       self%lift_mean = field_mean(self%lift)
@@ -118,6 +124,14 @@ contains
          u(:, j) = u(:, j) + level*self%lift(:, j)
       end do
    end subroutine solve
+
+   !> The displacement of a cell under its own unit pressure, m/Pa.
+   pure function softness(self) result(soft)
+      class(contact_inverse_type), intent(in) :: self
+      real(dp) :: soft
+
+      soft = self%tiles%soft
+   end function softness
 
    !> Multiply by the inverse.
    subroutine invert(self, u)

@@ -11,7 +11,8 @@
 !> At the fixed point z is P in contact and -c gap elsewhere, up to a constant. Module `steady_scale` therefore chooses c
 !> so that both parts of z have about the same size. Anderson acceleration makes it five to ten times faster. Near the
 !> solution, Newton's method on the cells in contact may be faster still (modules `steady_active` and `steady_newton`).
-!> From a distant start it fails on materials whose modulus spans three decades.
+!> From a distant start it fails on materials whose modulus spans three decades. There, and where the splitting is slow, as
+!> on flat tops in slow sliding, proximal steps take over (module `steady_proximal`).
 !>
 !> The criterion of convergence is that of module `normal_cg`: the duality gap e1 of a fresh U = K P, divided by the rms
 !> height or by a smaller scale if the contact is small, and the error of the load.
@@ -30,6 +31,7 @@ module steady_normal
    use stop_watch, only : stop_is_due
    use steady_active, only : finish_on_contact, worthwhile
    use steady_newton, only : finish_by_newton, promising
+   use steady_proximal, only : pays, solve_by_steps
    use steady_operator, only : steady_operator_type
    use steady_scale, only : bounded_scale, fitting_scale, misfit
    implicit none
@@ -40,6 +42,7 @@ module steady_normal
    integer, parameter :: pairs = 6               !! of the acceleration
    integer, parameter :: sums_count = 7
    integer, parameter :: first_trial = 16        !! iteration at which finishing on few cells is first tried
+   integer, parameter :: soon = 1000             !! transforms after which a dense system counts as one that will soon be cheap
    real(dp), parameter :: cautious = 2.0_dp      !! factor of growth of the residual after which a step is plain
 
    !> The measures of one evaluation of the fixed-point map.
@@ -57,6 +60,7 @@ module steady_normal
       real(dp) :: reference = huge(1.0_dp)       !! residual that later ones are compared to, Pa
       integer :: checks = 0                      !! times that the error was within the tolerance
       integer :: trial = first_trial             !! iteration at which finishing on few cells is tried next
+      logical :: stepped = .false.               !! proximal steps have been tried
       integer(int64) :: ffts_before = 0          !! of the operator, before the solve
    end type progress_type
 
@@ -152,7 +156,6 @@ contains
       type(gap_measure_type), intent(inout) :: found
       type(solver_result_type), intent(inout) :: outcome       !! converged, and the reason
       real(dp) :: scale
-      logical :: finished
 
       if (progress%measure%error <= task%tolerance) then
          if (mod(progress%checks, 4) == 0) then
@@ -168,20 +171,46 @@ contains
          progress%least = progress%measure%error
          self%best(:, :) = self%pressure
       end if
-      if (.not. outcome%converged .and. outcome%iterations >= progress%trial) then
-         finished = .false.
-         if (worthwhile(field_count(self%pressure > 0.0_dp), self%grid%cells(), &
-            int(operator%ffts - progress%ffts_before))) then
-            progress%trial = outcome%iterations + outcome%iterations/2
-            call finish_on_contact(operator, task, height, self%pressure, gap, found, finished)
-         else if (promising(outcome%iterations, progress%measure%error, task%tolerance)) then
-            progress%trial = outcome%iterations + outcome%iterations/2
-            call finish_by_newton(operator, task, height, self%pressure, gap, found, finished)
-         end if
-         outcome%converged = finished
-      end if
+      if (.not. outcome%converged .and. outcome%iterations >= progress%trial) &
+         call try_newton(self, operator, task, height, progress, gap, found, outcome)
       if (outcome%converged) outcome%reason = reason_converged
    end subroutine judge
+
+   !> Try a method that solves for all cells in contact, if it may be faster than the splitting. Its pressure is taken
+   !> if it is the solution, and kept if it is better than the best so far.
+   subroutine try_newton(self, operator, task, height, progress, gap, found, outcome)
+      class(steady_normal_type), intent(inout) :: self
+      type(steady_operator_type), intent(inout) :: operator
+      type(normal_problem_type), intent(in) :: task
+      real(dp), intent(in) :: height(:, :)
+      type(progress_type), intent(inout) :: progress
+      real(dp), intent(inout) :: gap(:, :)
+      type(gap_measure_type), intent(inout) :: found
+      type(solver_result_type), intent(inout) :: outcome       !! its iterations; out: converged
+      real(dp) :: touching
+      logical :: dense
+
+      touching = field_count(self%pressure > 0.0_dp)
+      dense = worthwhile(0.5_dp*touching, self%grid%cells(), soon)
+      associate (error => progress%measure%error, n => outcome%iterations)
+         if (worthwhile(touching, self%grid%cells(), int(operator%ffts - progress%ffts_before))) then
+            progress%trial = n + n/2
+            call finish_on_contact(operator, task, height, self%pressure, gap, found, outcome%converged)
+         else if (promising(n, error, task%tolerance)) then
+            progress%trial = n + n/2
+            call finish_by_newton(operator, task, height, self%pressure, gap, found, outcome%converged)
+         end if
+         if (outcome%converged .or. progress%stepped) return
+         if (.not. pays(n, progress%least, task%tolerance, dense)) return
+      end associate
+
+      progress%stepped = .true.
+      call solve_by_steps(operator, task, height, self%best, gap, found)
+      call operator%set_scale(self%c)
+      progress%least = min(progress%least, found%error)
+      outcome%converged = found%strict <= task%tolerance
+      if (outcome%converged) self%pressure(:, :) = self%best
+   end subroutine try_newton
 
    !> Compute the next z by an accelerated step, by a plain one if the residual has grown, or with another c.
    subroutine advance(self, operator, task, iteration, progress)
