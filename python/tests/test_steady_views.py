@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,6 +13,7 @@ from asperity.report import report_page
 from asperity.results.derived import road_speed
 from asperity.results.steady import steady_rows, steady_speeds
 from asperity.views.film import _animation
+from asperity.views.watch import last_row
 
 SPEEDS = (0.01, 1.0, 100.0)
 
@@ -81,6 +83,16 @@ def test_without_friction_a_curve_shows_area_and_loss_over_the_speed(tmp_path):
     assert [axes.get_ylabel() for axes in panels] == ["contact area fraction",
                                                       "friction coefficient"]
     assert panels[0].get_xlabel() == "sliding speed (m/s)"
+
+
+def test_the_speed_is_named_by_info_check_and_watch(curve, program):
+    info = subprocess.run([program, "info", str(curve.path)], capture_output=True, text=True,
+                          check=True).stdout
+    assert "phase 1: pressure 100000 Pa, relaxed\n" in info
+    assert "phase 3: pressure 200000 Pa, steady sliding at 1 m/s\n" in info
+    assert "! 4 phases, 3 steady states, 1 static solve, 0 time steps in 0 s" in (
+        asperity.Case.read(curve.input).check())
+    assert last_row(curve).startswith("step 3, sliding speed 100 m/s, contact area")
 
 
 def test_a_film_of_a_curve_goes_along_the_speeds(tmp_path):

@@ -67,8 +67,9 @@ contains
          unit = ' GB'
       end if
       text = '! cells of '//to_text(case%grid%dx)//' m by '//to_text(case%grid%dy)//' m'//nl
-      text = text//'! '//counted(size(case%phases), 'phase')//', '// &
-         counted(count(case%phases%static), 'static solve')//', '// &
+      text = text//'! '//counted(size(case%phases), 'phase')//', '
+      if (any(case%phases%steady)) text = text//counted(count(case%phases%steady), 'steady state')//', '
+      text = text//counted(count(case%phases%static .and. .not. case%phases%steady), 'static solve')//', '// &
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl

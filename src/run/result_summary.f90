@@ -214,6 +214,7 @@ contains
       character(:), allocatable :: text
       type(case_type) :: case
       type(error_type), allocatable :: error
+      real(dp) :: speed
       integer :: i
 
       text = ''
@@ -225,6 +226,10 @@ contains
             text = text//'  '//to_text(i)//'         '//trim(phase%name)//': '//trim(phase%control)//' '// &
                to_text(phase%target)//trim(merge(' Pa', ' N ', phase%control == 'pressure'))
             if (phase%control == 'displacement') text = text(:len(text) - 1)//'m'
+            speed = norm2([phase%velocity_x, phase%velocity_y])
+            if (phase%relaxed) text = text//', relaxed'
+            if (phase%steady) text = text//', steady sliding'
+            if (speed > 0.0_dp) text = text//' at '//to_text(speed)//' m/s'
             if (.not. phase%static) text = text//', '//to_text(phase%duration)//' s in '// &
                to_text(phase%steps)//' steps'
             text = text//nl

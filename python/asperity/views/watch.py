@@ -26,6 +26,7 @@ from ..results.standing import (
     time_of_row,
     way_on,
 )
+from ..results.steady import steady_rows
 from .style import si_scale
 
 if TYPE_CHECKING:
@@ -150,7 +151,8 @@ def last_row(run: Run) -> str:
     if not history.rows:
         return "no row yet"
     words = []
-    for name, short in (("step", "step"), ("time", "t ="), ("contact_area", "contact area"),
+    moment = (("sliding_speed", "sliding speed") if steady_rows(run)[-1] else ("time", "t ="))
+    for name, short in (("step", "step"), moment, ("contact_area", "contact area"),
                         ("stick_area", "stick area"), ("friction", "friction"),
                         ("iterations_normal", "iterations"), ("residual_normal", "residual")):
         if name not in history or (name == "stick_area" and not np.any(history[name])):
