@@ -95,6 +95,9 @@ contains
 
       last = operator%ffts + allowance*int(task%max_iterations, int64)
       next = operator%ffts + idle*int(task%max_iterations, int64)
+      ! Without memory for the steps, the error is not known.
+      found%error = huge(1.0_dp)
+      found%strict = huge(1.0_dp)
       call guess%prepare(operator, height, pressure, ready)
       if (.not. ready) return
       allocate (guess%centre, mold=pressure, stat=status)
