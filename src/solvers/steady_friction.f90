@@ -39,7 +39,8 @@ module steady_friction
    use steady_contact, only : contact_mean, explain, sliding_outcome_type, steady_contact_type
    use steady_joint, only : steady_joint_type
    use steady_judge, only : new_sliding, ratio_of_lengths, sliding_type
-   use steady_normal, only : new_steady_normal, steady_measure_type, steady_normal_type
+   use steady_measure, only : steady_measure_type
+   use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : steady_operator_type
    use steady_start, only : contact_without_friction, full_sliding, ratio_of_sliding
    use steady_pace, only : along_path, along_second_path, components, from_here, no_attempt, pace_type

@@ -24,7 +24,7 @@ module steady_normal
    use normal_state, only : gap_measure_type, measure_gap, narrow_scale, normal_problem_type, &
       prepare_problem, reason_converged, reason_iterations
    use asperity_precision, only : dp, int64
-   use field_sums, only : field_count, field_mean, field_minimum, field_sum, least_of_rows, row_totals
+   use field_sums, only : field_count, field_mean, field_minimum, field_sum
    use projection, only : project_simplex
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
@@ -32,6 +32,7 @@ module steady_normal
    use steady_active, only : finish_on_contact, worthwhile
    use steady_newton, only : finish_by_newton, promising
    use steady_proximal, only : pays, solve_by_steps
+   use steady_measure, only : measure_evaluation, steady_measure_type
    use steady_operator, only : steady_operator_type
    use steady_scale, only : bounded_scale, fitting_scale, misfit
    implicit none
@@ -40,18 +41,9 @@ module steady_normal
    public :: new_steady_normal, steady_normal_type
 
    integer, parameter :: pairs = 6               !! of the acceleration
-   integer, parameter :: sums_count = 7
    integer, parameter :: first_trial = 16        !! iteration at which finishing on few cells is first tried
    integer, parameter :: soon = 1000             !! transforms after which a dense system counts as one that will soon be cheap
    real(dp), parameter :: cautious = 2.0_dp      !! factor of growth of the residual after which a step is plain
-
-   !> The measures of one evaluation of the fixed-point map.
-   type, public :: steady_measure_type
-      real(dp) :: error = huge(1.0_dp)           !! duality gap over the scale of the problem
-      real(dp) :: change = 0.0_dp                !! |y - P|, root of the sum of squares, Pa
-      real(dp) :: size = 0.0_dp                  !! |P|, likewise, Pa
-      real(dp) :: scale = 0.0_dp                 !! c that would fit this state, Pa/m; 0: not known
-   end type steady_measure_type
 
    !> The progress of a solve.
    type :: progress_type
@@ -293,8 +285,6 @@ contains
       real(dp), intent(in) :: mean                     !! of the height, m
       real(dp), intent(in) :: z(:, :)
       type(steady_measure_type), intent(out) :: measure
-      real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(sums_count), least, opened, open_cells
       integer :: j
 
       self%pressure(:, :) = z
@@ -305,57 +295,9 @@ contains
          self%residual(:, j) = 2.0_dp*self%pressure(:, j) - z(:, j) + self%c*(height(:, j) - mean)
       end do
       call operator%resolve(self%residual, self%residual)
-      allocate (rows(sums_count + 1, self%grid%rows()))
-      !$omp parallel do default(none) shared(self, z, rows) private(j) num_threads(operator%threads)
-      do j = 1, self%grid%rows()
-         call measure_row(self%c, self%pressure(:, j), z(:, j), self%residual(:, j), rows(:, j))
-      end do
-      sums = row_totals(rows(:sums_count, :))
-      least = least_of_rows(rows(sums_count + 1, :))
-      measure%error = (sums(2)/sums(1) - least)/task%scale
-      measure%change = sqrt(sums(3))
-      measure%size = sqrt(sums(4))
-      open_cells = self%grid%cells() - sums(5)
-      if (sums(5) > 0.0_dp .and. open_cells > 0.0_dp) then
-         opened = (sums(7) - sums(6)/sums(5)*open_cells)/open_cells
-         if (opened > 0.0_dp) measure%scale = bounded_scale(operator, 2.0_dp*sums(1)/sums(5)/opened)
-      end if
+      call measure_evaluation(operator, self%c, self%pressure, z, self%residual, measure)
+      measure%error = measure%error/task%scale
    end subroutine evaluate
-
-   !> Form the sums of a row: P, P g, (y - P)^2, P^2, the number of cells in contact, g there, g elsewhere; and the
-   !> least g. The gap is that of y: g = K y - H = (2 P - z - y)/c.
-   pure subroutine measure_row(c, pressure, z, y, sums)
-      real(dp), intent(in) :: c
-      real(dp), intent(in) :: pressure(:), z(:)
-      real(dp), intent(inout) :: y(:)                  !! in: y; out: y - P, Pa
-      real(dp), intent(out) :: sums(:)
-      real(dp) :: gap, work, change, squares, cells, inside, outside, least, load
-      integer :: i
-
-      load = 0.0_dp
-      work = 0.0_dp
-      change = 0.0_dp
-      squares = 0.0_dp
-      cells = 0.0_dp
-      inside = 0.0_dp
-      outside = 0.0_dp
-      least = huge(1.0_dp)
-      !$omp simd private(gap) reduction(+:load, work, change, squares, cells, inside, outside) &
-      !$omp reduction(min:least)
-      do i = 1, size(y)
-         gap = (2.0_dp*pressure(i) - z(i) - y(i))/c
-         y(i) = y(i) - pressure(i)
-         load = load + pressure(i)
-         work = work + pressure(i)*gap
-         change = change + y(i)**2
-         squares = squares + pressure(i)**2
-         cells = cells + merge(1.0_dp, 0.0_dp, pressure(i) > 0.0_dp)
-         inside = inside + merge(gap, 0.0_dp, pressure(i) > 0.0_dp)
-         outside = outside + merge(0.0_dp, gap, pressure(i) > 0.0_dp)
-         least = min(least, gap)
-      end do
-      sums = [load, work, change, squares, cells, inside, outside, least]
-   end subroutine measure_row
 
    !> Change c if it differs much from one that fits. z is adjusted so that it represents the same pressure and gap,
    !> and the acceleration discards its differences.
