@@ -8,6 +8,7 @@
 !>
 !> Memory: one field.
 module modal_inverse
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp
    use field_sums, only : field_mean
    use steady_operator, only : steady_operator_type
@@ -29,15 +30,20 @@ module modal_inverse
 contains
 
    !> Prepare for another set of cells: two transforms. The operator is left with the scale 1/s.
-   subroutine renew(self, operator, inside, spring)
+   subroutine renew(self, operator, inside, spring, ready)
       class(modal_inverse_type), intent(inout) :: self
       type(steady_operator_type), intent(inout) :: operator
       logical, intent(in) :: inside(:, :)
       real(dp), intent(in) :: spring                   !! s, m/Pa
+      logical, intent(out) :: ready                    !! there is memory for it
+      integer :: status
 
+      status = 0
+      if (.not. allocated(self%lift)) allocate (self%lift(size(inside, 1), size(inside, 2)), stat=status)
+      ready = .not. any_process(status /= 0)
+      if (.not. ready) return
       self%spring = spring
       call operator%set_scale(1.0_dp/spring)
-      if (.not. allocated(self%lift)) allocate (self%lift, source=merge(1.0_dp, 0.0_dp, inside))
       self%lift(:, :) = merge(1.0_dp, 0.0_dp, inside)
       call invert(self, operator, inside, self%lift)
       self%lift_mean = field_mean(self%lift)

@@ -148,12 +148,15 @@ contains
       type(guess_type), intent(inout) :: guess
       type(steady_operator_type), intent(inout) :: operator
       real(dp), intent(out) :: unit              !! mean pressure in C that lifts C by 1 m, Pa/m
+      logical :: ready
 
       if (.not. guess%spring > 0.0_dp) guess%chosen = tiles
       if (guess%chosen == modes) then
-         call guess%modal%renew(operator, guess%inside, guess%spring)
+         call guess%modal%renew(operator, guess%inside, guess%spring, ready)
          unit = guess%modal%lift_mean
-      else
+         if (.not. ready) guess%chosen = tiles
+      end if
+      if (guess%chosen == tiles) then
          call guess%inverse%renew(guess%inside, guess%spring)
          unit = guess%inverse%lift_mean
       end if
