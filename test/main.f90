@@ -12,6 +12,7 @@ program main
    use test_case_input, only : run_case_input
    use test_checkpoint, only : run_checkpoint
    use test_chunk_writer, only : run_chunk_writer
+   use test_coarse_start, only : run_coarse_start
    use test_coupled_passes, only : run_coupled_passes
    use test_joint_step, only : run_joint_step
    use test_coupled_runs, only : run_coupled_runs
@@ -100,6 +101,7 @@ program main
          suite_type('adhesion_cg', run_adhesion_cg), &
          suite_type('mixed', run_mixed), &
          suite_type('normal_cg', run_normal_cg), &
+         suite_type('coarse_start', run_coarse_start), &
          suite_type('normal_limits', run_normal_limits), &
          suite_type('normal_invariance', run_normal_invariance), &
          suite_type('schur', run_schur), &

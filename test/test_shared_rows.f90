@@ -7,6 +7,7 @@ module test_shared_rows
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use asperity_precision, only : dp, int8
    use carried_field, only : carry, shift_field, shift_states
+   use coarse_fields, only : coarse_grid, coarsen, refine_pressure
    use check, only : begin_suite, check_close, check_no_error, check_that, selected
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use row_halo, only : fetch_rows, new_range_halo, row_halo_type
@@ -25,6 +26,8 @@ contains
       if (selected('bytes_come_from_their_owners')) call bytes_come_from_their_owners()
       if (selected('fields_shift_by_whole_cells')) call fields_shift_by_whole_cells()
       if (selected('fields_are_carried')) call fields_are_carried()
+      if (selected('coarse_fields_are_means')) call coarse_fields_are_means()
+      if (selected('pressures_are_refined')) call pressures_are_refined()
       if (selected('roads_are_read_across_rows')) call roads_are_read_across_rows()
    end subroutine run_shared_rows
 
@@ -121,6 +124,90 @@ contains
          end do
       end do
    end subroutine rows_come_from_their_owners
+
+   !> A coarse cell holds the mean over its area, of any part of the cells that lie in it.
+   subroutine coarse_fields_are_means()
+      type(grid_type) :: grid, coarse
+      real(dp), allocatable :: field(:, :), means(:, :)
+      real(dp) :: worst
+      integer :: i, j, k
+
+      do k = 1, size(sizes, 2)
+         call new_field(k, boundary_periodic, grid, field)
+         coarse = coarse_grid(grid)
+         allocate (means(coarse%nx, coarse%rows()))
+         call coarsen(grid, coarse, field, 1, means)
+         worst = 0.0_dp
+         do j = 1, coarse%rows()
+            do i = 1, coarse%nx
+               worst = max(worst, abs(means(i, j) - mean_value(grid, coarse, i, coarse%first_row - 1 + j)))
+            end do
+         end do
+         call check_close(worst, 0.0_dp, 1e-13_dp, 'mean over a coarse cell')
+         deallocate (means)
+      end do
+   end subroutine coarse_fields_are_means
+
+   !> Mean of the field over a coarse cell, by the lengths of its overlaps with all cells.
+   function mean_value(grid, coarse, i, j) result(mean)
+      type(grid_type), intent(in) :: grid, coarse
+      integer, intent(in) :: i, j
+      real(dp) :: mean
+      integer :: k, m
+
+      mean = 0.0_dp
+      do m = 1, grid%ny
+         do k = 1, grid%nx
+            mean = mean + value(k, m)*overlap(grid%dx, k, coarse%dx, i)*overlap(grid%dy, m, coarse%dy, j)
+         end do
+      end do
+      mean = mean/coarse%cell_area()
+
+   contains
+
+      !> The length that two cells have in common.
+      pure real(dp) function overlap(width, cell, other_width, other)
+         real(dp), intent(in) :: width, other_width
+         integer, intent(in) :: cell, other
+
+         overlap = max(0.0_dp, min(cell*width, other*other_width) - max((cell - 1)*width, (other - 1)*other_width))
+      end function overlap
+
+   end function mean_value
+
+   !> A pressure of the coarse grid is interpolated between the centres of cells; it stays zero where the nearest
+   !> coarse cell has none, and is exact for a plane.
+   subroutine pressures_are_refined()
+      type(grid_type) :: grid, coarse
+      real(dp), allocatable :: values(:, :), pressure(:, :), wanted(:, :)
+      integer :: i, j, place
+
+      grid = new_grid(40, 70, 1.0_dp, 1.0_dp, boundary_free)
+      call grid%share_rows()
+      coarse = coarse_grid(grid)
+      allocate (wanted(grid%nx, grid%rows()), pressure(grid%nx, grid%rows()))
+      allocate (values(coarse%nx, coarse%rows()))
+      do j = 1, coarse%rows()
+         do i = 1, coarse%nx
+            values(i, j) = 3.0_dp + 2.0_dp*(i - 0.5_dp)*coarse%dx + (coarse%first_row + j - 1.5_dp)*coarse%dy
+         end do
+      end do
+      values(4, :) = 0.0_dp
+      call refine_pressure(coarse, grid, values, 1, pressure)
+      do j = 1, grid%rows()
+         do i = 1, grid%nx
+            wanted(i, j) = 3.0_dp + 2.0_dp*(i - 0.5_dp)*grid%dx + (grid%first_row + j - 1.5_dp)*grid%dy
+         end do
+      end do
+      ! Away from the rim and from the coarse column without pressure.
+      do j = 1, grid%rows()
+         place = grid%first_row - 1 + j
+         if (place < 4 .or. place > grid%ny - 4) cycle
+         call check_close(maxval(abs(pressure(21:36, j) - wanted(21:36, j))), 0.0_dp, 1e-13_dp, 'a plane')
+         call check_close(maxval(abs(pressure(13:16, j))), 0.0_dp, 0.0_dp, 'no pressure')
+         call check_that(all(pressure(12:17:5, j) > 0.0_dp), 'pressure beside it')
+      end do
+   end subroutine pressures_are_refined
 
    !> Small integers are exchanged as well.
    subroutine bytes_come_from_their_owners()

@@ -26,6 +26,7 @@ module case_memory
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
    !> Further fields of a steady row: the approximate inverse, and the last two states on a path of solutions.
    real(dp), parameter :: path_fields = 15.0_dp
+   real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
@@ -67,9 +68,10 @@ contains
       ! hdf5_chunk_writer).
       buffers = 8.0_dp*(3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk))
 
-      ! The solvers need the copies, and the result needs the buffers, but not at the same time. The measured
-      ! fields of friction presuppose both.
-      bytes = 8.0_dp*fields*cells + program_itself + merge(copies + buffers, max(copies, buffers), rubs)
+      ! The first solve needs its start, later ones the copies, and the result the buffers, but not at the same time.
+      ! The measured fields of friction presuppose copies and buffers.
+      bytes = 8.0_dp*fields*cells + program_itself &
+         + merge(copies + buffers, max(copies, buffers, 8.0_dp*start_fields*cells), rubs)
    end function memory_needed
 
    !> The most memory that a run takes beyond `memory_needed` if a step with friction or a steady row is solved all at

@@ -18,6 +18,9 @@
 !> gives a step s, and adds the multiple of s to P that minimises the energy. Module `normal_iteration` chooses the
 !> direction and the step.
 !>
+!> On a large grid, a solve without a given start first solves the same problem roughly on about a quarter of the cells
+!> along each side, whose means of the height are a smoother road, and starts from that pressure (nested iteration).
+!>
 !> The solve has converged if the duality gap e1 = (mean gap weighted by the pressure - least gap)/h_rms and the
 !> error of the load are below the tolerance. If the contact is small on a tall
 !> map, a smaller scale than h_rms is used (`narrow_scale` of module `normal_state`).
@@ -31,18 +34,21 @@
 !> (the direction, the residual and the search direction of the preconditioner); the operator's spectrum, whose memory
 !> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
 !> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
-!> mode spectrum and symbol take three (three and a half in mixed precision).
+!> mode spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more
+!> until it is found.
 module normal_cg
+   use coarse_fields, only : coarse_grid, coarsen, refine_pressure
    use contact_solver, only : contact_solver_type
    use asperity_errors, only : error_type
+   use field_sums, only : field_count, field_mean, field_rms
    use finite_fields, only : reject_overflow
    use fft_conv, only : convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
    use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
       phase_conjugate, phase_ended, phase_restart
    use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
-   use normal_state, only : combine_measures, evaluate_gap, first_pressure, gap_measure_type, narrow_scale, &
-      normal_problem_type, prepare_problem, reason_undetermined, return_solution
+   use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, first_pressure, &
+      gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, return_solution
    use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type
@@ -56,14 +62,22 @@ module normal_cg
 
    public :: new_normal_solver, normal_solver_type
 
+   ! The start from a coarser grid.
+   real(dp), parameter :: least_roughness = 0.9_dp    !! rms height of the coarser road over that of the road
+   real(dp), parameter :: rough_tolerance = 1e-2_dp   !! of its solution: the details belong to the finer grid
+   integer, parameter :: most_rough_iterations = 30
+   real(dp), parameter :: nearly_full = 0.9_dp        !! contact area from which that of full contact is the better start
+
    !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
    !> copied.
    type, extends(contact_solver_type) :: normal_solver_type
       logical :: mixed = .false.                      !! products of steps in single precision
+      real(dp) :: coarse_start_from = 5e5_dp            !! cells from which a solve starts on a coarser grid
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
    contains
       procedure :: solve
+      procedure, private :: start_on_coarse_grid, solve_roughly
       procedure :: destroy
    end type normal_solver_type
 
@@ -88,8 +102,8 @@ contains
       allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
    end subroutine new_normal_solver
 
-   !> Solve a contact problem by the fast method.
-   subroutine solve(self, problem, height, pressure, gap, level, outcome, past)
+   !> Solve a contact problem by the fast method. It is recursive because the start may be a solution on a coarser grid.
+   recursive subroutine solve(self, problem, height, pressure, gap, level, outcome, past)
       class(normal_solver_type), intent(inout), target :: self
       type(normal_problem_type), intent(in) :: problem
       real(dp), contiguous, intent(in) :: height(:, :)             !! H, [nx, ny], m
@@ -103,7 +117,7 @@ contains
       type(gap_watch_type) :: watch
       type(iteration_type) :: now
       type(convolution_type), pointer :: product       !! the operator for the products of steps
-      real(dp) :: cells, began, before
+      real(dp) :: cells, began, before, effort
       logical :: determined
 
       call start_solve()
@@ -129,12 +143,14 @@ contains
       subroutine start_solve()
          began = omp_get_wtime()
          before = transforms(self)
+         cells = self%grid%cells()
+         call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
+         effort = 0.0_dp
+         if (determined) call self%start_on_coarse_grid(task, height, pressure, effort, past)
          call self%work%active%clear(self%work%preconditioner%residual, self%work%direction, &
             self%work%preconditioner%search, self%step)
          self%work%scale = 0.0_dp
          self%work%offset = 0.0_dp
-         cells = self%grid%cells()
-         call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
          call new_gap_watch(watch, self%mixed, task%tolerance)
          product => self%operator
          if (watch%single) product => self%quick
@@ -224,11 +240,78 @@ contains
          call reject_overflow(outcome, pressure, gap, self%operator%threads)
          ! A transform of the coarse level counts as a fraction. The small addition keeps the round-off of earlier counts
          ! from deciding how a half is rounded.
-         outcome%ffts = nint(transforms(self) - before + 1e-6_dp, int64)
+         outcome%ffts = nint(transforms(self) - before + effort + 1e-6_dp, int64)
          outcome%seconds = omp_get_wtime() - began
       end subroutine finish_solve
 
    end subroutine solve
+
+   !> On a large grid, replace a missing start by the pressure of a rough solution on a coarser grid, if that is worth
+   !> the effort.
+   recursive subroutine start_on_coarse_grid(self, task, height, pressure, effort, past)
+      class(normal_solver_type), intent(in) :: self
+      type(normal_problem_type), intent(inout) :: task
+      real(dp), intent(in) :: height(:, :)                 !! H, m
+      real(dp), intent(inout) :: pressure(:, :)            !! Pa
+      real(dp), intent(out) :: effort                      !! in transforms of the size of the grid
+      real(dp), intent(in), optional :: past(:, :)         !! P_h, Pa
+      type(grid_type) :: coarse
+      real(dp), allocatable :: road(:, :), memory(:, :), rough(:, :)
+      logical :: useful
+
+      effort = 0.0_dp
+      if (task%warm .or. self%grid%cells() < self%coarse_start_from) return
+      if (task%control == control_pressure .and. task%target <= 0.0_dp) return
+      coarse = coarse_grid(self%grid)
+      allocate (road(coarse%nx, coarse%rows()))
+      call coarsen(self%grid, coarse, height, self%operator%threads, road)
+      if (field_rms(road, field_mean(road)) < least_roughness*task%rms_height) return
+      if (present(past)) then
+         allocate (memory, mold=road)
+         call coarsen(self%grid, coarse, past, self%operator%threads, memory)
+      end if
+
+      allocate (rough, mold=road)
+      call self%solve_roughly(coarse, task, road, memory, rough, effort, useful)
+      if (.not. useful) return
+      call refine_pressure(coarse, self%grid, rough, self%operator%threads, pressure)
+      task%warm = .true.
+      task%displaced = .false.
+   end subroutine start_on_coarse_grid
+
+   !> Solve a problem roughly on a coarser grid.
+   recursive subroutine solve_roughly(self, coarse, task, road, memory, pressure, effort, useful)
+      class(normal_solver_type), intent(in) :: self
+      type(grid_type), intent(in) :: coarse
+      type(normal_problem_type), intent(in) :: task        !! the problem of this solver's grid
+      real(dp), intent(in) :: road(:, :)                   !! H, m
+      real(dp), allocatable, intent(in) :: memory(:, :)    !! P_h, Pa, if there is any
+      real(dp), intent(out) :: pressure(:, :)              !! Pa
+      real(dp), intent(out) :: effort                      !! in transforms of the size of this solver's grid
+      logical, intent(out) :: useful                       !! the pressure is a good start
+      type(normal_solver_type) :: solver
+      type(normal_problem_type) :: problem
+      type(solver_result_type) :: outcome
+      type(error_type), allocatable :: error
+      real(dp), allocatable :: gap(:, :)
+      real(dp) :: level
+
+      effort = 0.0_dp
+      useful = .false.
+      call new_normal_solver(solver, coarse, self%work%coarse%kernel, error, self%mixed)
+      if (allocated(error)) return
+      solver%coarse_start_from = huge(1.0_dp)
+      problem = task
+      if (task%control == control_approach) problem%target = task%target - task%datum
+      problem%rms_height = 0.0_dp
+      problem%tolerance = max(rough_tolerance, task%tolerance)
+      problem%max_iterations = min(most_rough_iterations, task%max_iterations)
+      allocate (gap, mold=road)
+      call solver%solve(problem, road, pressure, gap, level, outcome, memory)
+      call solver%destroy()
+      effort = outcome%ffts*coarse%cells()/self%grid%cells()
+      useful = outcome%converged .and. field_count(pressure > 0.0_dp) < nearly_full*coarse%cells()
+   end subroutine solve_roughly
 
    !> Transforms done so far. Those of the coarse level count by their number of cells.
    pure function transforms(self) result(count)

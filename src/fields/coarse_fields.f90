@@ -1,0 +1,203 @@
+!> Fields on a coarser grid: means over its cells, and the interpolation of a pressure back to the grid.
+!>
+!> The number of cells of the grid need not be a multiple of that of the coarser one: a coarse cell takes of a
+!> cell on its edge the part that lies in it. Processes share the rows of both grids, each grid by its own rule.
+module coarse_fields
+   use asperity_precision, only : dp, int64
+   use regular_grid, only : grid_type, new_grid
+   use row_halo, only : fetch_rows
+   use transform_lengths, only : good_length
+   implicit none
+   private
+
+   public :: coarse_grid, coarsen, refine_pressure
+
+   real(dp), parameter :: ratio = 4.0_dp   !! cells of the grid to a cell of the coarse one along a side, about
+
+contains
+
+   !> A grid over the same lengths with about a quarter of the cells along each side, as many as are cheap to
+   !> transform.
+   function coarse_grid(fine) result(coarse)
+      type(grid_type), intent(in) :: fine
+      type(grid_type) :: coarse
+
+      coarse = new_grid(fewer(fine%nx), fewer(fine%ny), fine%lx, fine%ly, fine%boundary)
+      if (fine%shared) call coarse%share_rows()
+
+   contains
+
+      !> The number of coarse cells along a side.
+      pure integer function fewer(cells)
+         integer, intent(in) :: cells
+
+         fewer = min(good_length(max(1, nint(cells/ratio)), 1), cells)
+      end function fewer
+
+   end function coarse_grid
+
+   !> Means of a field over the coarse cells. Collective.
+   subroutine coarsen(fine, coarse, field, threads, means)
+      type(grid_type), intent(in) :: fine, coarse
+      real(dp), intent(in) :: field(:, :)          !! [fine%nx, fine%rows()]
+      integer, intent(in) :: threads
+      real(dp), intent(out) :: means(:, :)         !! [coarse%nx, coarse%rows()]
+      real(dp), allocatable :: strips(:, :), fetched(:, :)
+      integer :: covered(2), j
+
+      allocate (strips(coarse%nx, fine%rows()))
+      !$omp parallel do default(none) shared(field, strips) private(j) num_threads(threads)
+      do j = 1, size(strips, 2)
+         call mean_along_row(field(:, j), strips(:, j))
+      end do
+
+      if (.not. fine%shared) then
+         call mean_over_rows(strips, 1)
+         return
+      end if
+      covered = [1, 0]
+      if (coarse%rows() > 0) covered = [first_cell(fine%ny, coarse%ny, coarse%first_row), &
+         last_cell(fine%ny, coarse%ny, coarse%last_row)]
+      allocate (fetched(coarse%nx, covered(2) - covered(1) + 1))
+      call fetch_rows(fine, strips, covered, fetched)
+      call mean_over_rows(fetched, covered(1))
+
+   contains
+
+      !> The coarse rows of this process, from rows of which the first is a given row of the grid.
+      subroutine mean_over_rows(rows, first)
+         real(dp), intent(in) :: rows(:, :)
+         integer, intent(in) :: first
+         integer :: j, k, row
+
+         !$omp parallel do default(none) shared(fine, coarse, rows, first, means) private(j, k, row) &
+         !$omp num_threads(threads)
+         do j = 1, coarse%rows()
+            row = coarse%first_row - 1 + j
+            means(:, j) = 0.0_dp
+            do k = first_cell(fine%ny, coarse%ny, row), last_cell(fine%ny, coarse%ny, row)
+               means(:, j) = means(:, j) + part_of(fine%ny, coarse%ny, k, row)*rows(:, k - first + 1)
+            end do
+         end do
+      end subroutine mean_over_rows
+
+   end subroutine coarsen
+
+   !> Means of the values of a row over its coarse cells.
+   pure subroutine mean_along_row(values, means)
+      real(dp), intent(in) :: values(:)
+      real(dp), intent(out) :: means(:)
+      integer :: i, k, m, n
+
+      n = size(values)
+      m = size(means)
+      do i = 1, m
+         means(i) = 0.0_dp
+         do k = first_cell(n, m, i), last_cell(n, m, i)
+            means(i) = means(i) + part_of(n, m, k, i)*values(k)
+         end do
+      end do
+   end subroutine mean_along_row
+
+   !> The first of n cells that a coarse cell covers, also in part.
+   elemental integer function first_cell(n, coarse, cell)
+      integer, intent(in) :: n, coarse             !! cells of the two grids along the side
+      integer, intent(in) :: cell                  !! of the coarse grid, from 1
+
+      first_cell = int(int(cell - 1, int64)*n/coarse) + 1
+   end function first_cell
+
+   !> The last of n cells that a coarse cell covers, also in part.
+   elemental integer function last_cell(n, coarse, cell)
+      integer, intent(in) :: n, coarse             !! cells of the two grids along the side
+      integer, intent(in) :: cell                  !! of the coarse grid, from 1
+
+      last_cell = int((int(cell, int64)*n + coarse - 1)/coarse)
+   end function last_cell
+
+   !> The part of a coarse cell that lies in cell k of n.
+   elemental real(dp) function part_of(n, coarse, k, cell)
+      integer, intent(in) :: n, coarse             !! cells of the two grids along the side
+      integer, intent(in) :: k                     !! of the grid, from 1
+      integer, intent(in) :: cell                  !! of the coarse grid, from 1
+
+      associate (fine_end => int(k, int64)*coarse, coarse_end => int(cell, int64)*n)
+         part_of = real(min(fine_end, coarse_end) - max(fine_end - coarse, coarse_end - n), dp)/n
+      end associate
+   end function part_of
+
+   !> Interpolate a pressure of the coarse grid between the centres of its cells. The pressure remains zero on
+   !> coarse cells that do not touch: interpolated pressure would widen the contact by half a coarse cell. Collective.
+   subroutine refine_pressure(coarse, fine, values, threads, pressure)
+      type(grid_type), intent(in) :: coarse, fine
+      real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()], Pa
+      integer, intent(in) :: threads
+      real(dp), intent(out) :: pressure(:, :)      !! [fine%nx, fine%rows()], Pa
+      real(dp), allocatable :: rows(:, :), between(:)
+      real(dp) :: part
+      integer :: range(2), j, below
+
+      range = [1, 0]
+      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row), &
+         below_centre(fine%ny, coarse%ny, fine%last_row) + 1]
+      allocate (rows(coarse%nx, range(2) - range(1) + 1))
+      call fetch_rows(coarse, values, range, rows)
+
+      !$omp parallel default(none) shared(coarse, fine, rows, range, pressure) private(j, below, part, between) &
+      !$omp num_threads(threads)
+      allocate (between(coarse%nx))
+      !$omp do
+      do j = 1, fine%rows()
+         associate (row => fine%first_row - 1 + j)
+            below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
+            part = part_above(fine%ny, coarse%ny, row)
+         end associate
+         between(:) = (1.0_dp - part)*rows(:, below) + part*rows(:, below + 1)
+         where (rows(:, below + nint(part)) <= 0.0_dp) between = 0.0_dp
+         call refine_row(coarse, between, pressure(:, j))
+      end do
+      !$omp end parallel
+   end subroutine refine_pressure
+
+   !> Interpolate the pressure of a row.
+   pure subroutine refine_row(coarse, values, pressure)
+      type(grid_type), intent(in) :: coarse
+      real(dp), intent(in) :: values(:)            !! [coarse%nx], Pa
+      real(dp), intent(out) :: pressure(:)         !! Pa
+      real(dp) :: part, beside(2)
+      integer :: i, k, below
+
+      do i = 1, size(pressure)
+         below = below_centre(size(pressure), coarse%nx, i)
+         part = part_above(size(pressure), coarse%nx, i)
+         beside = 0.0_dp
+         do k = 1, 2
+            associate (column => coarse%column_at(below + k - 1))
+               if (column > 0) beside(k) = values(column)
+            end associate
+         end do
+         pressure(i) = 0.0_dp
+         if (beside(1 + nint(part)) > 0.0_dp) pressure(i) = (1.0_dp - part)*beside(1) + part*beside(2)
+      end do
+   end subroutine refine_row
+
+   !> The last coarse cell whose centre does not lie beyond that of cell k of n; 0 before the first centre.
+   elemental integer function below_centre(n, coarse, k)
+      integer, intent(in) :: n, coarse             !! cells of the two grids along the side
+      integer, intent(in) :: k                     !! of the grid, from 1
+
+      ! The centre is at (2 k - 1) coarse/(2 n) coarse cells from the edge, and coarse cell m at m - 1/2.
+      below_centre = int(((2_int64*k - 1)*coarse + n)/(2_int64*n))
+   end function below_centre
+
+   !> How far the centre of cell k of n lies from the coarse centre below it towards the next one, 0 to 1.
+   elemental real(dp) function part_above(n, coarse, k)
+      integer, intent(in) :: n, coarse             !! cells of the two grids along the side
+      integer, intent(in) :: k                     !! of the grid, from 1
+
+      associate (place => (2_int64*k - 1)*coarse + n)
+         part_above = real(modulo(place, 2_int64*n), dp)/(2.0_dp*n)
+      end associate
+   end function part_above
+
+end module coarse_fields

@@ -1,0 +1,157 @@
+!> Tests of the start of a normal solve from a coarser grid: the same solution, in fewer transforms where it is used.
+module test_coarse_start
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp
+   use check, only : begin_suite, check_no_error, check_order, check_that, selected
+   use kernels, only : normal_half_space
+   use normal_cg, only : new_normal_solver, normal_solver_type
+   use normal_fixture, only : distance, duality_gap, poisson, rough_problem, solution_type
+   use normal_state, only : control_approach, normal_problem_type
+   use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use text_tools, only : to_text
+   implicit none
+   private
+
+   public :: run_coarse_start
+
+contains
+
+   subroutine run_coarse_start()
+      call begin_suite('coarse_start')
+      if (selected('the_solution_is_the_same')) then
+         call the_solution_is_the_same(new_grid(160, 128, 1.0_dp, 0.8_dp, boundary_periodic))
+         call the_solution_is_the_same(new_grid(151, 101, 1.0_dp, 0.9_dp, boundary_periodic))
+         call the_solution_is_the_same(new_grid(150, 130, 1.0_dp, 0.9_dp, boundary_free))
+         call the_solution_is_the_same(new_grid(250, 1, 1.0_dp, 1.0_dp, boundary_periodic))
+      end if
+      if (selected('a_given_past_counts')) call a_given_past_counts()
+      if (selected('it_saves_transforms')) call it_saves_transforms()
+      if (selected('not_where_it_cannot_help')) call not_where_it_cannot_help()
+   end subroutine run_coarse_start
+
+   !> Solve with a start from a coarser grid, or without.
+   subroutine run_from(coarse, grid, problem, height, solution, mixed, past)
+      logical, intent(in) :: coarse                    !! start from a coarser grid
+      type(grid_type), intent(in) :: grid
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :)             !! m
+      type(solution_type), intent(out) :: solution
+      logical, intent(in), optional :: mixed           !! in mixed precision
+      real(dp), intent(in), optional :: past(:, :)     !! P_h, Pa
+      type(normal_solver_type) :: solver
+      type(error_type), allocatable :: error
+
+      allocate (solution%pressure(grid%nx, grid%ny), solution%gap(grid%nx, grid%ny), source=0.0_dp)
+      call new_normal_solver(solver, grid, normal_half_space(poisson), error, mixed)
+      call check_no_error(error, 'a solver')
+      solver%coarse_start_from = merge(0.0_dp, huge(1.0_dp), coarse)
+      call solver%solve(problem, height, solution%pressure, solution%gap, solution%level, solution%outcome, past)
+      call solver%destroy()
+   end subroutine run_from
+
+   !> From either start, a solve finds the same pressure, under a load and for an approach, in both precisions.
+   subroutine the_solution_is_the_same(grid)
+      type(grid_type), intent(in) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: height(:, :)
+      real(dp) :: d, e1
+      integer :: k
+      character(:), allocatable :: what
+
+      call rough_problem(grid, 16.0_dp, 0.01_dp, problem, height)
+      problem%tolerance = 1e-8_dp
+      do k = 1, 4
+         if (k == 3) then
+            problem%control = control_approach
+            problem%target = -0.6_dp*maxval(height)
+         end if
+         what = to_text(grid%nx)//' x '//to_text(grid%ny)//' cells, variant '//to_text(k)
+         call run_from(.false., grid, problem, height, s, modulo(k, 2) == 0)
+         call run_from(.true., grid, problem, height, t, modulo(k, 2) == 0)
+         call check_that(s%outcome%converged .and. t%outcome%converged, what//': '//t%outcome%reason)
+         call check_that(any(abs(s%pressure - t%pressure) > 0.0_dp), what//': the start was another one')
+         call distance(grid, problem%modulus, height, s%pressure, t%pressure, d)
+         ! If the approach is prescribed, the error of the load adds to that of the gap.
+         call check_order(d, '<=', merge(8.0_dp, 16.0_dp, k <= 2)*problem%tolerance, what//': the same pressure')
+         call duality_gap(grid, problem%modulus, height, t%pressure, e1)
+         if (k <= 2) call check_order(e1, '<=', 1.01_dp*problem%tolerance, what//': error recomputed')
+      end do
+   end subroutine the_solution_is_the_same
+
+   !> A given traction of the past is a part of the problem on the coarser grid, too.
+   subroutine a_given_past_counts()
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t, without
+      real(dp), allocatable :: height(:, :), past(:, :)
+      real(dp) :: d
+
+      grid = new_grid(128, 128, 1.0_dp, 1.0_dp, boundary_periodic)
+      call rough_problem(grid, 16.0_dp, 0.01_dp, problem, height)
+      call run_from(.false., grid, problem, height, without)
+      past = 2.0_dp*cshift(without%pressure, 9, dim=1)
+      call run_from(.false., grid, problem, height, s, past=past)
+      call run_from(.true., grid, problem, height, t, past=past)
+      call check_that(s%outcome%converged .and. t%outcome%converged, 'past: '//t%outcome%reason)
+      call distance(grid, problem%modulus, height, s%pressure, t%pressure, d)
+      call check_order(d, '<=', 8.0_dp*problem%tolerance, 'past: the same pressure')
+      call distance(grid, problem%modulus, height, without%pressure, t%pressure, d)
+      call check_order(d, '>=', 0.1_dp, 'past: it changes the pressure')
+   end subroutine a_given_past_counts
+
+   !> On a road without waves shorter than 16 cells, the start saves a seventh of the transforms or more.
+   subroutine it_saves_transforms()
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: s, t
+      real(dp), allocatable :: height(:, :)
+
+      grid = new_grid(512, 512, 1.0_dp, 1.0_dp, boundary_periodic)
+      call rough_problem(grid, 16.0_dp, 0.005_dp, problem, height)
+      call run_from(.false., grid, problem, height, s)
+      call run_from(.true., grid, problem, height, t)
+      call check_that(s%outcome%converged .and. t%outcome%converged, 'saving: '//t%outcome%reason)
+      call check_order(int(7*t%outcome%ffts), '<=', int(6*s%outcome%ffts), &
+         'saving: '//to_text(int(t%outcome%ffts))//' transforms instead of '//to_text(int(s%outcome%ffts)))
+   end subroutine it_saves_transforms
+
+   !> The ordinary start is used near full contact, where it is nearly the solution, for a road whose cells are
+   !> independent of each other, which a coarser grid cannot show, and if no load is given.
+   subroutine not_where_it_cannot_help()
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      real(dp), allocatable :: height(:, :)
+      real(dp) :: loads(3)
+      integer :: i, j, k
+
+      grid = new_grid(96, 96, 1.0_dp, 1.0_dp, boundary_periodic)
+      loads = [0.12_dp, 0.01_dp, 0.0_dp]
+      do k = 1, 3
+         call rough_problem(grid, 8.0_dp, loads(k), problem, height)
+         if (k == 2) then
+            do j = 1, grid%ny
+               do i = 1, grid%nx
+                  height(i, j) = modulo(7919*i + 1049*j*j + 31*i*j, 10007)*1e-7_dp
+               end do
+            end do
+         end if
+         call check_same_pressure(grid, problem, height, 'case '//to_text(k))
+      end do
+   end subroutine not_where_it_cannot_help
+
+   !> Check that the pressure has the same bits with and without a start from a coarser grid.
+   subroutine check_same_pressure(grid, problem, height, what)
+      type(grid_type), intent(in) :: grid
+      type(normal_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: height(:, :)             !! m
+      character(*), intent(in) :: what
+      type(solution_type) :: s, t
+
+      call run_from(.false., grid, problem, height, s)
+      call run_from(.true., grid, problem, height, t)
+      call check_that(all(abs(s%pressure - t%pressure) <= 0.0_dp), what//': the ordinary start', &
+         [maxval(abs(s%pressure - t%pressure))])
+   end subroutine check_same_pressure
+
+end module test_coarse_start
