@@ -241,3 +241,14 @@ def test_tiny_loads_are_met():
         contact = asperity.solve_normal(height, 1.0, 0.8, 1e6, pressure=pressure, tolerance=1e-8)
         assert contact.mean_pressure == pytest.approx(pressure, rel=1e-8)
         assert contact.pressure.ravel().argmax() == height.ravel().argmax()
+
+
+def test_round_off_is_no_contact():
+    """A cell from which a step took the whole pressure is open, also if round-off left some behind."""
+    x = np.arange(5) / 5
+    height = 1.5e-6 * np.cos(2 * np.pi * x)[None, :] * np.cos(2 * np.pi * x)[:, None]
+    for pressure in np.geomspace(1e3, 1e6, 40):
+        contact = asperity.solve_normal(height, 5e-5, None, 2e6, pressure=pressure)
+        touching = contact.pressure > 0
+        assert contact.gap[touching].max() < 1e-4 * 1.5e-6, pressure
+        assert contact.contact_area == touching.mean()

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from coupled_reference import Block
+from scipy.interpolate import CubicSpline
 
 import asperity
 from asperity import theory
@@ -163,3 +164,69 @@ def test_slow_sliding_under_a_pull(tmp_path):
     late = pulled["time"] > 1.1
     found = np.polyfit(pulled["time"][late], pulled["road_x"][late], 1)[0]
     assert found == pytest.approx(speed, rel=2e-3)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_an_approach_that_loses_contact_within_a_step(tmp_path):
+    """Without strength, friction changes no pressure, also where a pass finds the surfaces apart."""
+    text = (
+        "&grid nx = 16, ny = 1, lx = 16e-5 /\n"
+        "&surface shape = 'sine', amplitude = 1e-6, wavelength = 16e-5 /\n"
+        "&material shear_modulus = 1e6, prony_g = 5e6, prony_tau = 1e-4 /\n"
+        "&phase displacement = 3e-7, relaxed = .true. /\n"
+        "&phase displacement = 1.5e-7, ramp = 'linear', duration = 1e-4, steps = 2, "
+        "velocity_x = 0.1 /\n"
+        "&solver time_scheme = 'backward_euler' /\n")
+    runs = []
+    flat = "&friction law = 'coulomb', coefficient = 0, slope_effect = .false. /\n"
+    for k, friction in enumerate(("", flat)):
+        (tmp_path / f"case{k}.nml").write_text(text + friction)
+        runs.append(asperity.run(tmp_path / f"case{k}.nml", quiet=True).history)
+    for name in ("pressure", "energy_elastic", "contact_area"):
+        assert runs[1][name] == pytest.approx(runs[0][name], rel=1e-4), name
+    assert (runs[0]["pressure"] > 0).all()
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_surfaces_that_are_drawn_apart_carry_nothing(tmp_path):
+    """An elastic solid that was in friction contact stores no energy once it is lifted off."""
+    (tmp_path / "case.nml").write_text(
+        "&grid nx = 16, ny = 1, lx = 16e-5 /\n"
+        "&surface shape = 'sine', amplitude = 1e-6, wavelength = 16e-5 /\n"
+        "&material shear_modulus = 1e6 /\n&friction law = 'coulomb', coefficient = 0.3 /\n"
+        "&phase displacement = 3e-7 /\n&phase duration = 1e-4, steps = 2, velocity_x = 0.1 /\n"
+        "&phase displacement = -1e-7, duration = 1e-4, steps = 2, velocity_x = 0.1 /\n")
+    history = asperity.run(tmp_path / "case.nml", quiet=True).history
+    apart = history["displacement"] < 0
+    assert apart.sum() == 3
+    for name in ("pressure", "energy_elastic", "contact_area", "traction_x"):
+        assert history[name][apart] == pytest.approx(0.0, abs=1e-12 * history[name].max()), name
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_open_cells_stand_over_the_road_under_the_moved_surface(tmp_path):
+    """A cell that the moved surface presses into the road is in contact; gaps belong to that road."""
+    height = 1e-6 * np.array([
+        3.93, 16.54, 28.7, 40.43, 47.7, 45.76, 34.13, 17.67, 2.39, -9.55, -20.43, -32.49, -43.71,
+        -48.5, -42.87, -28.47, -11.23])
+    length, width, pressure, period = 1.204e-4, 1.248e-5, 1.887e5, 2.1255e-4
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["surface"] = height[None, :]
+    (tmp_path / "case.nml").write_text(
+        f"&grid nx = 17, ny = 1, lx = {length}, ly = {width} /\n"
+        "&surface shape = 'file', file = 'road.h5' /\n"
+        "&material poisson = 0.5, shear_modulus = 1e6, thickness = 4.86e-5 /\n"
+        "&friction law = 'coulomb', coefficient = 2, slope_effect = .false. /\n"
+        f"&phase pressure = {pressure} /\n"
+        f"&phase duration = {period}, velocity_x = 0.1, steps = 3 /\n"
+        f"&phase duration = {period / 2}, velocity_x = -0.1, steps = 1 /\n"
+        "&solver tolerance = 1e-9 /\n&output snapshot_every = 1 /\n")
+    run = asperity.run(tmp_path / "case.nml", quiet=True)
+    assert run.history["residual_coupling"].max() <= 1e-9
+    rms, dx = np.std(height), length / 17
+    spline = CubicSpline(dx * np.arange(18), np.append(height, height[0]), bc_type="periodic")
+    for snapshot, road in zip(run.snapshots, run.history["road_x"], strict=True):
+        place = dx * np.arange(17) + snapshot["displacement_x"].ravel() - road
+        level = (snapshot["displacement_z"] - snapshot["gap"]).ravel() - spline(place % length)
+        assert level == pytest.approx(level[0], abs=1e-6 * rms), snapshot.step
+        assert snapshot["gap"].min() > -1e-6 * rms, snapshot.step

@@ -1,10 +1,15 @@
 !> The error of a pass of a row with friction: the difference between the road at the displacement U_T that the pass has
 !> found, and the road on which it was solved.
 !>
-!> It is the larger of two means that are weighted by the pressure: the difference of the heights divided by the rms
-!> height of the map, and that of the slopes divided by the slopes in the contact. With constant shear a cell with hardly
-!> any pressure carries as much traction as any other, and these means do not show whether it obeys the law. In that case
-!> the sum of the errors of all cells (module `edge_shares`) counts as well.
+!> It is the largest of three numbers. Two are means that are weighted by the pressure: the difference of the heights
+!> divided by the rms height of the map, and that of the slopes divided by the slopes in the contact. The third shows
+!> cells that should have come into contact, which these means do not contain: the sum of the overlaps of the cells
+!> without pressure with the road at U_T, divided by the number of cells with pressure and by the rms height. With
+!> constant shear a cell with hardly any pressure carries as much traction as any other, and none of these shows whether
+!> it obeys the law. In that case the sum of the errors of all cells (module `edge_shares`) counts as well.
+!>
+!> Outside the contact U_T may differ much from the place at which the road was read, because nothing there depends on
+!> it. Cells without pressure therefore get the road at U_T, and their gap over it. U_z and the solves are not changed.
 !>
 !> Memory: three fields, which are borrowed from the workspace of the contact.
 module coupling_mismatch
@@ -24,7 +29,7 @@ module coupling_mismatch
 
 contains
 
-   !> The mismatch that a pass leaves. Without any pressure it is 0, or the error of the shares.
+   !> Compute the mismatch that a pass leaves, and put the cells without pressure over the road at U_T.
    function mismatch_of(contact, plan, sharing, edge) result(mismatch)
       class(contact_type), intent(inout) :: contact    !! after the tangential solve of the pass
       type(planned_row_type), intent(in) :: plan
@@ -33,7 +38,7 @@ contains
       real(dp) :: mismatch
       real(dp), pointer, contiguous :: height(:, :), slope_x(:, :), slope_y(:, :)     ! of the road at U_T
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(4), edges
+      real(dp) :: sums(6), edges
       integer :: j
 
       call contact%work%lend('height at U_T', height)
@@ -41,14 +46,24 @@ contains
       call contact%work%lend('slope along y at U_T', slope_y)
       call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
          contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
-      allocate (rows(4, contact%grid%rows()))
+      allocate (rows(size(sums), contact%grid%rows()))
       !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
       do j = 1, contact%grid%rows()
-         rows(1, j) = sum(abs(contact%state%pressure(:, j)))
-         rows(2, j) = sum(abs(contact%state%pressure(:, j)*(height(:, j) - contact%height(:, j))))
-         rows(3, j) = sum(abs(contact%state%pressure(:, j))*hypot(slope_x(:, j) - contact%slope_x(:, j), &
-            slope_y(:, j) - contact%slope_y(:, j)))
-         rows(4, j) = sum(abs(contact%state%pressure(:, j))*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
+         associate (pressure => contact%state%pressure(:, j), gap => contact%state%gap(:, j))
+            rows(1, j) = sum(abs(pressure))
+            rows(2, j) = sum(abs(pressure*(height(:, j) - contact%height(:, j))))
+            rows(3, j) = sum(abs(pressure)*hypot(slope_x(:, j) - contact%slope_x(:, j), &
+               slope_y(:, j) - contact%slope_y(:, j)))
+            rows(4, j) = sum(abs(pressure)*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
+            where (.not. abs(pressure) > 0.0_dp)
+               gap = gap + (contact%height(:, j) - height(:, j))
+               contact%height(:, j) = height(:, j)
+               contact%slope_x(:, j) = slope_x(:, j)
+               contact%slope_y(:, j) = slope_y(:, j)
+            end where
+            rows(5, j) = sum(max(-gap, 0.0_dp), mask=.not. abs(pressure) > 0.0_dp)
+            rows(6, j) = count(abs(pressure) > 0.0_dp)
+         end associate
       end do
       sums = row_totals(rows)
       edges = 0.0_dp
@@ -63,7 +78,7 @@ contains
       call contact%work%take_back(height)
       call contact%work%take_back(slope_x)
       call contact%work%take_back(slope_y)
-      mismatch = edges
+      mismatch = max(edges, sums(5)/max(contact%rms_height*max(sums(6), 1.0_dp), tiny(1.0_dp)))
       if (.not. sums(1) > 0.0_dp) return
       mismatch = max(mismatch, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
          sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))

@@ -48,7 +48,8 @@ module normal_cg
       phase_conjugate, phase_ended, phase_restart
    use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
    use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, first_pressure, &
-      gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, return_solution
+      gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, remove_round_off, &
+      return_solution
    use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type
@@ -236,6 +237,7 @@ contains
             call compute_gap()
          end if
          outcome%reason = now%reason
+         call remove_round_off(measure, self%grid%cells(), self%operator%threads, pressure, gap)
          call return_solution(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
          call reject_overflow(outcome, pressure, gap, self%operator%threads)
          ! A transform of the coarse level counts as a fraction. The small addition keeps the round-off of earlier counts

@@ -9,9 +9,9 @@ module normal_cg_thesis
    use asperity_errors, only : error_type
    use fft_conv, only : new_convolution
    use finite_fields, only : reject_overflow
-   use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, &
-      return_solution, measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, &
-      reason_undetermined
+   use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
+      narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined, remove_round_off, &
+      return_solution
    use omp_lib, only : omp_get_wtime
    use field_sums, only : cell_count, row_total
    use kernels, only : kernel_type
@@ -87,6 +87,7 @@ contains
          call move(task, alpha, direction, pressure, outcome)
          if (outcome%reason /= reason_iterations) exit
       end do
+      call remove_round_off(measure, self%grid%cells(), self%operator%threads, pressure, gap)
       call return_solution(problem, task, measure, determined, self%operator%threads, gap, level, outcome)
       outcome%ffts = self%operator%ffts - before
       call reject_overflow(outcome, pressure, gap, self%operator%threads)

@@ -11,7 +11,7 @@ module normal_state
    private
 
    public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, return_solution, measure_gap, &
-      narrow_scale, normal_problem_type, prepare_problem, row_measure
+      narrow_scale, normal_problem_type, prepare_problem, remove_round_off, row_measure
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
@@ -21,6 +21,7 @@ module normal_state
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
 
+   real(dp), parameter :: several = 16.0_dp             !! units of round-off of the mean pressure in the contact
    real(dp), parameter :: shallow = 10.0_dp             !! largest scale over the displacement under the load
 
    !> A normal contact problem without its fields.
@@ -254,27 +255,28 @@ contains
       end do
    end subroutine evaluate_gap
 
-   !> Compute the first pressure: the given one, or else that of full contact (Westergaard) in periodic mode and a
-   !> cap of the height in free mode, projected on the admissible pressures.
+   !> Compute the first pressure: the given one, or that of full contact (Westergaard) in periodic mode and a cap of the
+   !> height in free mode, projected on the admissible pressures. A given pressure that is zero everywhere is no start,
+   !> and problem%warm then becomes .false., because a displacement handed in with it is not that of the first pressure.
    subroutine first_pressure(problem, grid, operator, height, pressure, past)
-      type(normal_problem_type), intent(in) :: problem
+      type(normal_problem_type), intent(inout) :: problem
       type(grid_type), intent(in) :: grid
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: height(:, :)
       real(dp), intent(inout) :: pressure(:, :)
       real(dp), intent(in), optional :: past(:, :)
       real(dp) :: factor, base
-      logical :: warm
+      logical :: usable
       integer :: j
 
       if (problem%control == control_pressure .and. problem%target <= 0.0_dp) then
          call project_simplex(pressure, 0.0_dp)
          return
       end if
-      warm = problem%warm
-      if (warm) then
-         call rescale(problem, grid, operator%threads, pressure, warm)
-         if (warm) return
+      if (problem%warm) then
+         call rescale(problem, grid, operator%threads, pressure, usable)
+         problem%warm = usable
+         if (usable) return
       end if
       base = 0.0_dp
       if (grid%boundary == boundary_periodic) then
@@ -331,6 +333,24 @@ contains
          pressure(:, j) = (target/load)*pressure(:, j)
       end do
    end subroutine rescale
+
+   !> Set pressures that are only round-off to zero. Where a step takes all pressure from a cell, its difference may leave
+   !> some 1e-16 of it behind, and the cell would count as touching although its gap is open.
+   subroutine remove_round_off(measure, cells, threads, pressure, gap)
+      type(gap_measure_type), intent(in) :: measure
+      real(dp), intent(in) :: cells                         !! of the grid
+      integer, intent(in) :: threads
+      real(dp), contiguous, intent(inout) :: pressure(:, :)   !! Pa
+      real(dp), contiguous, intent(in) :: gap(:, :)         !! U - H, m
+      real(dp) :: least
+      integer :: j
+
+      least = several*epsilon(1.0_dp)*measure%load/max(measure%contact*cells, 1.0_dp)
+      !$omp parallel do default(none) shared(pressure, gap, measure, least) private(j) num_threads(threads)
+      do j = 1, size(pressure, 2)
+         where (pressure(:, j) <= least .and. gap(:, j) > measure%weighted_level) pressure(:, j) = 0.0_dp
+      end do
+   end subroutine remove_round_off
 
    !> Return a solution: the outcome according to its measure, and the gap measured from the level.
    subroutine return_solution(problem, task, measure, determined, threads, gap, level, outcome)
