@@ -21,7 +21,7 @@ module normal_state
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
 
-   real(dp), parameter :: several = 16.0_dp             !! units of round-off of the mean pressure in the contact
+   real(dp), parameter :: round_off = 256.0_dp*epsilon(1.0_dp)   !! of a pressure, over the mean one in the contact
    real(dp), parameter :: shallow = 10.0_dp             !! largest scale over the displacement under the load
 
    !> A normal contact problem without its fields.
@@ -335,7 +335,7 @@ contains
    end subroutine rescale
 
    !> Set pressures that are only round-off to zero. Where a step takes all pressure from a cell, its difference may leave
-   !> some 1e-16 of it behind, and the cell would count as touching although its gap is open.
+   !> some 1e-15 of it behind, and the cell would count as touching although its gap is open.
    subroutine remove_round_off(measure, cells, threads, pressure, gap)
       type(gap_measure_type), intent(in) :: measure
       real(dp), intent(in) :: cells                         !! of the grid
@@ -345,7 +345,7 @@ contains
       real(dp) :: least
       integer :: j
 
-      least = several*epsilon(1.0_dp)*measure%load/max(measure%contact*cells, 1.0_dp)
+      least = round_off*measure%load/max(measure%contact*cells, 1.0_dp)
       !$omp parallel do default(none) shared(pressure, gap, measure, least) private(j) num_threads(threads)
       do j = 1, size(pressure, 2)
          where (pressure(:, j) <= least .and. gap(:, j) > measure%weighted_level) pressure(:, j) = 0.0_dp
