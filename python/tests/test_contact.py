@@ -244,7 +244,7 @@ def test_tiny_loads_are_met():
 
 
 def test_round_off_is_no_contact():
-    """A cell from which a step took the whole pressure is open, also if round-off left some behind."""
+    """A cell from which a step took the whole pressure is open, whatever round-off left behind."""
     x = np.arange(5) / 5
     height = 1.5e-6 * np.cos(2 * np.pi * x)[None, :] * np.cos(2 * np.pi * x)[:, None]
     for pressure in np.geomspace(1e3, 1e6, 40):

@@ -168,7 +168,7 @@ def test_slow_sliding_under_a_pull(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_an_approach_that_loses_contact_within_a_step(tmp_path):
-    """Without strength, friction changes no pressure, also where a pass finds the surfaces apart."""
+    """Without strength, friction changes no pressure, also if a pass finds the surfaces apart."""
     text = (
         "&grid nx = 16, ny = 1, lx = 16e-5 /\n"
         "&surface shape = 'sine', amplitude = 1e-6, wavelength = 16e-5 /\n"
@@ -205,7 +205,7 @@ def test_surfaces_that_are_drawn_apart_carry_nothing(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_open_cells_stand_over_the_road_under_the_moved_surface(tmp_path):
-    """A cell that the moved surface presses into the road is in contact; gaps belong to that road."""
+    """A cell that the moved surface presses on the road is in contact; gaps belong to that road."""
     height = 1e-6 * np.array([
         3.93, 16.54, 28.7, 40.43, 47.7, 45.76, 34.13, 17.67, 2.39, -9.55, -20.43, -32.49, -43.71,
         -48.5, -42.87, -28.47, -11.23])
