@@ -230,3 +230,26 @@ def test_open_cells_stand_over_the_road_under_the_moved_surface(tmp_path):
         level = (snapshot["displacement_z"] - snapshot["gap"]).ravel() - spline(place % length)
         assert level == pytest.approx(level[0], abs=1e-6 * rms), snapshot.step
         assert snapshot["gap"].min() > -1e-6 * rms, snapshot.step
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_pull_near_the_friction_limit_stays_finite(tmp_path):
+    """A block that the friction may not hold across a ridge gives a clear outcome with numbers."""
+    height = 1e-7 * np.array([8.10, 3.66, -5.84, -7.27, 1.35])
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["surface"] = np.tile(height, (3, 1))
+    (tmp_path / "case.nml").write_text(
+        "&grid nx = 5, ny = 3, lx = 5.148e-05, ly = 0.004391 /\n"
+        "&surface shape = 'file', file = 'road.h5' /\n"
+        "&material poisson = 0, shear_modulus = 1e6, prony_g = 8.476e6, prony_tau = 2.038e-5, "
+        "thickness = 9.133e-6 /\n"
+        "&friction law = 'coulomb_orowan', coefficient = 0.1493, shear_strength = 158.6 /\n"
+        "&phase pressure = 2171, relaxed = .true. /\n"
+        "&phase duration = 5.148e-5, traction_x = -0.05593, traction_y = 10.06, steps = 4, "
+        "ramp = 'linear' /\n"
+        "&solver tolerance = 1e-9, time_scheme = 'backward_euler' /\n"
+        f"&output file = '{tmp_path / 'case.h5'}' /\n")
+    with pytest.raises(asperity.NotConverged, match="the road is pulled by"):
+        asperity.run(tmp_path / "case.nml", quiet=True)
+    with asperity.open(tmp_path / "case.h5") as run:
+        assert np.isfinite(run.history["road_y"]).all()

@@ -87,15 +87,21 @@ contains
       end if
    end subroutine watch_motion
 
-   !> Explain why a row has no solution if the friction cannot hold the pull.
+   !> Explain why a row has no solution if the friction can hold neither the pull nor the pressures on the slopes.
    function pull_outcome(plan, tangential) result(reason)
       type(planned_row_type), intent(in) :: plan
       type(tangential_step_type), intent(in) :: tangential
       character(:), allocatable :: reason
 
-      reason = 'the road is pulled by '//to_text(norm2(merge(plan%pull, 0.0_dp, plan%pulled)))// &
-         ' Pa over the cell, and the friction holds at most '//to_text(norm2(tangential%road%held))// &
-         ' Pa, so that there is no equilibrium. A block with density would accelerate'
+      associate (pull => norm2(merge(plan%pull, 0.0_dp, plan%pulled)), held => norm2(tangential%road%held))
+         reason = 'the road is pulled by '//to_text(pull)//' Pa over the cell, and '
+         if (held < pull) then
+            reason = reason//'the friction holds at most '//to_text(held)//' Pa'
+         else
+            reason = reason//'the contact pushes it back with '//to_text(held)//' Pa or more, more than friction holds'
+         end if
+         reason = reason//', so that there is no equilibrium near its position. A block with density would accelerate'
+      end associate
    end function pull_outcome
 
 end module pulled_road

@@ -83,7 +83,8 @@ contains
       t = 1.0_dp
       call try(at_far)
       side = 0
-      do while (at_far > 0.0_dp .and. norm2(sums%missed) > allowed .and. trial < corrections)
+      ! Without a change of sign there is nothing between the two ends: round-off has spoilt s.
+      do while (at_near < 0.0_dp .and. at_far > 0.0_dp .and. norm2(sums%missed) > allowed .and. trial < corrections)
          t = near + (far - near)*at_near/(at_near - at_far)
          call try(at_t)
          if (at_t > 0.0_dp) then
