@@ -55,7 +55,7 @@ contains
       type(steady_operator_type), intent(inout) :: operator
       logical, intent(in) :: inside(:, :)
       real(dp), intent(in) :: mean                     !! Pa
-      real(dp), intent(inout) :: u(:, :)               !! in: m, zero outside; out: the pressures, Pa, zero outside
+      real(dp), intent(inout) :: u(:, :)               !! lengths, m, then pressures, Pa; zero outside
       real(dp), intent(out) :: level                   !! m
 
       call invert(self, operator, inside, u)
@@ -70,7 +70,7 @@ contains
       type(modal_inverse_type), intent(in) :: self
       type(steady_operator_type), intent(inout) :: operator
       logical, intent(in) :: inside(:, :)
-      real(dp), intent(inout) :: u(:, :)               !! in: m; out: Pa
+      real(dp), intent(inout) :: u(:, :)               !! lengths, m, then pressures, Pa
 
       call operator%resolve(u, u)
       u(:, :) = merge(u/self%spring, 0.0_dp, inside)
