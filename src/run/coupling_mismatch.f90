@@ -49,21 +49,7 @@ contains
       allocate (rows(size(sums), contact%grid%rows()))
       !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
       do j = 1, contact%grid%rows()
-         associate (pressure => contact%state%pressure(:, j), gap => contact%state%gap(:, j))
-            rows(1, j) = sum(abs(pressure))
-            rows(2, j) = sum(abs(pressure*(height(:, j) - contact%height(:, j))))
-            rows(3, j) = sum(abs(pressure)*hypot(slope_x(:, j) - contact%slope_x(:, j), &
-               slope_y(:, j) - contact%slope_y(:, j)))
-            rows(4, j) = sum(abs(pressure)*hypot(contact%slope_x(:, j), contact%slope_y(:, j)))
-            where (.not. abs(pressure) > 0.0_dp)
-               gap = gap + (contact%height(:, j) - height(:, j))
-               contact%height(:, j) = height(:, j)
-               contact%slope_x(:, j) = slope_x(:, j)
-               contact%slope_y(:, j) = slope_y(:, j)
-            end where
-            rows(5, j) = sum(max(-gap, 0.0_dp), mask=.not. abs(pressure) > 0.0_dp)
-            rows(6, j) = count(abs(pressure) > 0.0_dp)
-         end associate
+         call compare_row(contact, j, height(:, j), slope_x(:, j), slope_y(:, j), rows(:, j))
       end do
       sums = row_totals(rows)
       edges = 0.0_dp
@@ -83,5 +69,37 @@ contains
       mismatch = max(mismatch, sums(2)/max(contact%rms_height*sums(1), tiny(1.0_dp)), &
          sums(3)/max(sums(4), least_slope*contact%rms_slope*sums(1), tiny(1.0_dp)))
    end function mismatch_of
+
+   !> Compare the road of a pass with that at U_T along a row, and put the cells without pressure over the latter.
+   pure subroutine compare_row(contact, j, height, slope_x, slope_y, sums)
+      class(contact_type), intent(inout) :: contact
+      integer, intent(in) :: j
+      real(dp), intent(in) :: height(:), slope_x(:), slope_y(:)     !! of the road at U_T
+      !> Sums of the pressure; with the pressure as weight, of the differences in height and in slope, and of the slope;
+      !> of the overlaps; and the number of cells with pressure.
+      real(dp), intent(out) :: sums(6)
+      real(dp) :: p
+      integer :: i
+
+      sums = 0.0_dp
+      do i = 1, size(height)
+         p = abs(contact%state%pressure(i, j))
+         if (p > 0.0_dp) then
+            sums(1) = sums(1) + p
+            sums(2) = sums(2) + p*abs(height(i) - contact%height(i, j))
+            ! Slopes are of the order of one, so that their squares need no care; hypot would take several times longer.
+            sums(3) = sums(3) + p*sqrt((slope_x(i) - contact%slope_x(i, j))**2 &
+               + (slope_y(i) - contact%slope_y(i, j))**2)
+            sums(4) = sums(4) + p*sqrt(contact%slope_x(i, j)**2 + contact%slope_y(i, j)**2)
+            sums(6) = sums(6) + 1.0_dp
+         else
+            contact%state%gap(i, j) = contact%state%gap(i, j) + (contact%height(i, j) - height(i))
+            contact%height(i, j) = height(i)
+            contact%slope_x(i, j) = slope_x(i)
+            contact%slope_y(i, j) = slope_y(i)
+            sums(5) = sums(5) + max(-contact%state%gap(i, j), 0.0_dp)
+         end if
+      end do
+   end subroutine compare_row
 
 end module coupling_mismatch

@@ -343,12 +343,15 @@ contains
       real(dp), contiguous, intent(inout) :: pressure(:, :)   !! Pa
       real(dp), contiguous, intent(in) :: gap(:, :)         !! U - H, m
       real(dp) :: least
-      integer :: j
+      integer :: i, j
 
       least = round_off*measure%load/max(measure%contact*cells, 1.0_dp)
-      !$omp parallel do default(none) shared(pressure, gap, measure, least) private(j) num_threads(threads)
+      !$omp parallel do default(none) shared(pressure, gap, measure, least) private(i, j) num_threads(threads)
       do j = 1, size(pressure, 2)
-         where (pressure(:, j) <= least .and. gap(:, j) > measure%weighted_level) pressure(:, j) = 0.0_dp
+         if (.not. any(pressure(:, j) > 0.0_dp .and. pressure(:, j) <= least)) cycle
+         do i = 1, size(pressure, 1)
+            if (pressure(i, j) <= least .and. gap(i, j) > measure%weighted_level) pressure(i, j) = 0.0_dp
+         end do
       end do
    end subroutine remove_round_off
 

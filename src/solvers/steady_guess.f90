@@ -42,7 +42,7 @@ module steady_guess
       integer :: most_directions = 60            !! of GMRES
       type(contact_inverse_type), private :: inverse
       type(modal_inverse_type), private :: modal
-      integer :: chosen = tiles         !! the inverse in use
+      integer, private :: chosen = tiles         !! the inverse in use
       real(dp), private :: price(2) = 0.0_dp     !! transforms per decade of either inverse when it was last used; 0: never
       integer, private :: since = 0              !! solutions with the inverse in use
       real(dp), allocatable, private :: work(:, :), moved(:, :)

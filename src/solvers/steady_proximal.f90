@@ -56,6 +56,7 @@ module steady_proximal
       integer :: outcome = settled
       logical :: careful = .false.               !! s is not reduced until C settles soon
       logical :: solved = .true.                 !! all linear systems have reached the accuracy
+      logical :: gap_known = .true.              !! the gap is that of the pressure
    end type step_type
 
 contains
@@ -87,8 +88,7 @@ contains
       type(guess_type) :: guess
       type(step_type) :: step
       type(gap_measure_type) :: here
-      real(dp) :: negative
-      real(dp) :: marked
+      real(dp) :: marked, negative
       integer(int64) :: last, next
       integer :: status
       logical :: ready
@@ -118,8 +118,10 @@ contains
             guess%pressure(:, :) = guess%centre
             guess%inside(:, :) = guess%pressure > 0.0_dp
             guess%level = step%level
+            step%gap_known = .false.
          else
             call move_centre(guess, operator, task, height)
+            step%gap_known = .true.
             call guess%judge(operator, task, height, here, negative)
             if (here%strict < found%strict) then
                found = here
@@ -168,7 +170,8 @@ contains
       do while (step%rounds < most_rounds)
          step%rounds = step%rounds + 1
          guess%pressure(:, :) = merge(max(guess%pressure, 0.0_dp), 0.0_dp, guess%inside)
-         call guess%find_gap(operator, height)
+         if (.not. step%gap_known) call guess%find_gap(operator, height)
+         step%gap_known = .false.
          call guess%correct(operator, task, step%wanted, solved)
          call guess%find_gap(operator, height)
          step%solved = step%solved .and. solved
