@@ -3,8 +3,8 @@
 !>
 !> It is the largest of three numbers. Two are means that are weighted by the pressure: the difference of the heights
 !> divided by the rms height of the map, and that of the slopes divided by the slopes in the contact. The third shows
-!> cells that should have come into contact, which these means do not contain: the sum of the overlaps of the cells
-!> without pressure with the road at U_T, divided by the number of cells with pressure and by the rms height. With
+!> cells that should carry more pressure, or any: the sum of the lengths by which the road at U_T overlaps the surface,
+!> divided by the number of cells with pressure and by the rms height. The means hardly contain these cells. With
 !> constant shear a cell with hardly any pressure carries as much traction as any other, and none of these shows whether
 !> it obeys the law. In that case the sum of the errors of all cells (module `edge_shares`) counts as well.
 !>
@@ -84,6 +84,7 @@ contains
       sums = 0.0_dp
       do i = 1, size(height)
          p = abs(contact%state%pressure(i, j))
+         sums(5) = sums(5) + max(height(i) - contact%height(i, j) - max(contact%state%gap(i, j), 0.0_dp), 0.0_dp)
          if (p > 0.0_dp) then
             sums(1) = sums(1) + p
             sums(2) = sums(2) + p*abs(height(i) - contact%height(i, j))
@@ -97,7 +98,6 @@ contains
             contact%height(i, j) = height(i)
             contact%slope_x(i, j) = slope_x(i)
             contact%slope_y(i, j) = slope_y(i)
-            sums(5) = sums(5) + max(-contact%state%gap(i, j), 0.0_dp)
          end if
       end do
    end subroutine compare_row
