@@ -44,6 +44,7 @@ contains
          call controls_go_through_the_same_states('free', free_map//sphere, '0.05', '0.1e-6', '0.5e-6')
       if (selected('force_is_derivative_of_energy')) call force_is_derivative_of_energy()
       if (selected('pull_off_force_in_a_run')) call pull_off_force_in_a_run()
+      if (selected('later_phases_do_not_change_a_row')) call later_phases_do_not_change_a_row()
       if (selected('detachment_is_reported')) call detachment_is_reported()
       if (selected('wave_at_no_load_has_two_states')) call wave_at_no_load_has_two_states()
       if (selected('loss_of_a_viscoelastic_pull_off')) call loss_of_a_viscoelastic_pull_off()
@@ -166,6 +167,24 @@ contains
       call check_close(pulls(3), -1.60073_dp, 0.02_dp*1.6_dp, 'pull-off force, lambda = 1')
       call check_close(pulls(2), -1.60073_dp, 0.03_dp*1.6_dp, 'pull-off force, lambda = 1, coarse')
    end subroutine pull_off_force_in_a_run
+
+   !> The edge of the attraction of Maugis-Dugdale depends on the material and on the cells, but not on the phases: rows
+   !> are the same to the last bit, whatever follows.
+   subroutine later_phases_do_not_change_a_row()
+      type(record_type) :: short, long
+      character(:), allocatable :: text
+
+      text = '&grid nx = 32, ny = 32, lx = 40e-6, boundary = ''free'' /'//nl// &
+         sphere//soft//sticky('maugis_dugdale', '0.4e-6')//'&phase displacement = 0.1e-6 /'//nl// &
+         '&phase displacement = 0.2e-6, duration = 1e-3, steps = 2, ramp = ''linear'' /'//nl
+      call run_case(text, 'without a later phase', short)
+      call run_case(text//'&phase displacement = 0.0, duration = 10.0, steps = 2, ramp = ''linear'' /'//nl// &
+         '&phase displacement = 0.1e-6, relaxed = .true. /'//nl, 'with later phases', long)
+      call check_close(maxval(abs(short%rows(0:2)%force - long%rows(0:2)%force)), 0.0_dp, 0.0_dp, &
+         'later phases: the force of the rows before')
+      call check_close(maxval(abs(short%rows(0:2)%energy_adhesive - long%rows(0:2)%energy_adhesive)), 0.0_dp, 0.0_dp, &
+         'later phases: the adhesive energy of the rows before')
+   end subroutine later_phases_do_not_change_a_row
 
    !> Pull a sphere off and return the largest pull, in pi gamma_0 R.
    subroutine pull_off(n, side, lambda, first, middle, final, pull)

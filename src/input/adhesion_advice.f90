@@ -22,7 +22,8 @@
 !>
 !> For a viscoelastic material the softest modulus of the run is used, because it gives the narrowest zone: the
 !> modulus after relaxation over the time of the run, the instantaneous one if there are only static solves, or
-!> the long-term one if there is a relaxed phase.
+!> the long-term one if there is a relaxed phase. Only the edge of maugis_dugdale, on which the results depend,
+!> always follows from the long-term modulus (`adhesion_edge`).
 module adhesion_advice
    use adhesion_potential, only : edge_of_cells
    use case_settings, only : case_type, surface_settings_type
@@ -114,7 +115,7 @@ contains
          ' m: cells should not be larger'//with_modulus(case)
       if (case%adhesion%potential == 'maugis_dugdale') text = text//nl// &
          'adhesion: the attraction ends linearly over range +- '//to_text(rounded(adhesion_edge(case)))// &
-         ' m, so that the cells do not pin the contact'
+         ' m'//width_in_words(case)//', so that the cells do not pin the contact'
 
       do i = 1, size(case%surfaces)
          associate (term => case%surfaces(i), adhesion => case%adhesion)
@@ -201,14 +202,27 @@ contains
       end if
    end function power_integral
 
-   !> Half width of the edge of the range of maugis_dugdale that the cells need with the softest modulus, m.
+   !> Half width of the edge of the range of maugis_dugdale that the cells need, m. The attraction is a property of the
+   !> surfaces. It must be the same in all rows, because otherwise the adhesive energy of a contact at rest would change,
+   !> and it must not depend on phases that come later. The width therefore follows from the long-term modulus, with
+   !> which it is sufficient for every response of the material. A stiffer response would need less.
    pure function adhesion_edge(case) result(edge)
       type(case_type), intent(in) :: case
       real(dp) :: edge
 
       edge = edge_of_cells(case%adhesion%energy, case%adhesion%range, &
-         contact_modulus(case, softest_modulus(case)), longer_side(case))
+         contact_modulus(case, case%material%shear_modulus), longer_side(case))
    end function adhesion_edge
+
+   !> The modulus from which the edge of a viscoelastic material follows, in words; empty if it is elastic.
+   function width_in_words(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+
+      text = ''
+      if (size(case%material%prony_g) > 0) text = ' (in all phases; from the long-term E* = '// &
+         to_text(contact_modulus(case, case%material%shear_modulus))//' Pa)'
+   end function width_in_words
 
    !> The longer side of a cell, m.
    pure function longer_side(case) result(cell)

@@ -383,11 +383,12 @@ contains
    !> Half width of the edge of maugis_dugdale that frees a contact from the cells, m.
    pure function edge_of_cells(energy, range, modulus, cell) result(edge)
       real(dp), intent(in) :: energy, range    !! gamma_0, J/m2, and z_0, m
-      real(dp), intent(in) :: modulus          !! E*, Pa
+      real(dp), intent(in) :: modulus          !! E*, Pa; 0 for a material that flows
       real(dp), intent(in) :: cell             !! length of a cell, the longer one, m
       real(dp) :: edge
 
-      edge = min(edge_width*energy/range*cell/modulus, range)
+      edge = range
+      if (edge_width*energy/range*cell < modulus*range) edge = edge_width*energy/range*cell/modulus
    end function edge_of_cells
 
 end module adhesion_potential
