@@ -116,11 +116,8 @@ contains
             if (.not. sim%finished) call sim%advance(error)
             finished = merge(1, 0, sim%finished)
             call take_warnings(sim%warnings, warnings)
-            if (.not. allocated(error) .and. .not. sim%converged) call fail(error, error_convergence, &
-               'step '//to_text(sim%state%row%step)//' of phase '//to_text(sim%state%row%phase)//', t = '// &
-               to_text(sim%state%row%time)//' s: the solver did not converge: '//trim(sim%reason)// &
-               '; residual '//to_text(sim%residual)//', allowed '// &
-               to_text(sim%case%solver%tolerance))
+            if (.not. allocated(error) .and. .not. sim%converged) &
+               call fail(error, error_convergence, sim%failure())
          end associate
       end if
       call report(error, status, message)

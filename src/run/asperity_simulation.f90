@@ -31,6 +31,7 @@ module asperity_simulation
    use steady_row, only : solve_steady_row
    use steady_step, only : new_steady_step, steady_step_type
    use step_watches, only : add_warning, watch_cells, watch_edge, watch_stick_slip
+   use solver_result, only : solver_result_type
    use text_tools, only : to_text
    use arm_state, only : past_traction
    use zener, only : extrapolates, is_elastic, needs_start, restart_order, start_jump, &
@@ -50,8 +51,8 @@ module asperity_simulation
       logical :: converged = .true.                 !! the last row's solvers met the tolerance
       logical :: finished = .false.                 !! no row is left
       character(320) :: reason = ''                 !! why not converged
-      real(dp) :: residual = 0.0_dp                 !! of the solver that did not converge, or of the normal one
-      real(dp) :: allowed = 0.0_dp                  !! of that residual
+      real(dp), private :: residual = 0.0_dp        !! the error that is too large, or the residual of the normal solver
+      real(dp), private :: allowed = 0.0_dp         !! the largest that would have been accepted
       character(:), allocatable :: warnings         !! new ones, one per line; the caller clears them
       type(state_type), allocatable :: proposed     !! found by `propose`, not yet accepted
       integer, private :: old_warnings = 0          !! characters of `warnings` before the proposal
@@ -64,6 +65,7 @@ module asperity_simulation
       procedure :: propose
       procedure :: accept
       procedure :: reject
+      procedure :: failure
       procedure :: resume
       procedure :: destroy
    end type simulation_type
@@ -283,16 +285,43 @@ contains
       type(found_step_type), intent(in) :: found
 
       self%converged = found%normal%converged .and. found%rubbing%converged
-      self%reason = found%normal%reason
-      self%allowed = self%case%solver%tolerance
-      self%residual = found%normal%residual
       if (found%normal%converged .and. .not. found%rubbing%converged) then
+         call note_outcome(self, found%rubbing)
          self%reason = 'friction: '//trim(found%rubbing%reason)
-         self%residual = found%rubbing%residual
-         if (self%tangential%road%slides_off) self%reason = pull_outcome(plan, self%tangential)
+         if (self%tangential%road%slides_off) then
+            self%reason = pull_outcome(plan, self%tangential)
+            self%residual = found%rubbing%load_error
+         end if
+      else
+         call note_outcome(self, found%normal)
       end if
       if (found%passes > 0) call check_passes(self, plan, found)
    end subroutine judge
+
+   !> Note the outcome of a solver, and which of its two errors is too large.
+   subroutine note_outcome(self, outcome)
+      type(simulation_type), intent(inout) :: self
+      type(solver_result_type), intent(in) :: outcome
+
+      self%reason = outcome%reason
+      self%allowed = merge(outcome%required, self%case%solver%tolerance, outcome%required > 0.0_dp)
+      self%residual = outcome%residual
+      if (outcome%residual <= self%allowed .and. outcome%load_error > self%allowed) self%residual = outcome%load_error
+   end subroutine note_outcome
+
+   !> One sentence about a row that has not converged. It compares an error with the allowed one only if this error is the
+   !> reason.
+   function failure(self) result(text)
+      class(simulation_type), intent(in) :: self
+      character(:), allocatable :: text
+
+      associate (row => self%state%row)
+         text = 'step '//to_text(row%step)//' of phase '//to_text(row%phase)//', t = '//to_text(row%time)// &
+            ' s: the solver did not converge: '//trim(self%reason)
+      end associate
+      if (.not. self%residual <= self%allowed) text = text//'; residual '//to_text(self%residual)//', allowed '// &
+         to_text(self%allowed)
+   end function failure
 
    !> Check the mismatch that the passes have left. The row has not converged if it is larger than the case
    !> allows. If the case allows a large mismatch, a warning reports it.
@@ -304,6 +333,7 @@ contains
 
       associate (solver => self%case%solver, mismatch => found%mismatch)
          if (.not. self%converged .or. mismatch <= solver%tolerance) return
+         self%allowed = solver%tolerance
          if (solver%passes > 0) self%allowed = max(self%allowed, large_mismatch)
          if (solver%coupling_tolerance > 0.0_dp) self%allowed = max(solver%tolerance, solver%coupling_tolerance)
          advice = advice_on_passes(self)

@@ -138,11 +138,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error   !! an error that is already set is not replaced
       character(:), allocatable :: outcome
 
-      associate (row => self%sim%state%row)
-         outcome = 'step '//to_text(row%step)//' of phase '//to_text(row%phase)//', t = '//to_text(row%time)// &
-            ' s: the solver did not converge: '//trim(self%sim%reason)//'; residual '// &
-            to_text(self%sim%residual)//', allowed '//to_text(self%sim%allowed)
-      end associate
+      outcome = self%sim%failure()
       call self%files%write_outcome(outcome, error)
       if (.not. allocated(error)) call fail(error, error_convergence, self%files%path//': '//outcome// &
          '; all steps up to this one are kept')

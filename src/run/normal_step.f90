@@ -46,7 +46,8 @@ module normal_step
       type(adhesion_potential_type) :: potential
       type(adhesion_solver_type), private :: adhesion
       logical, private :: full_contact = .false.
-      real(dp) :: tolerance = 1e-6_dp              !! of the next solve
+      real(dp) :: tolerance = 1e-6_dp              !! of the next solve; that of the case always suffices
+      real(dp), private :: accepted = 1e-6_dp      !! that of the case
       integer, private :: max_iterations = 1000
    contains
       procedure :: solve
@@ -69,6 +70,7 @@ contains
 
       self%grid = grid
       self%tolerance = solver%tolerance
+      self%accepted = solver%tolerance
       self%max_iterations = solver%max_iterations
       self%adhesive = adhesion%potential /= 'none'
       self%summit = field_maximum(height)
@@ -122,6 +124,7 @@ contains
       problem%potential = self%potential
       problem%modulus = task%modulus
       problem%tolerance = self%tolerance
+      problem%accepted = self%accepted
       problem%max_iterations = self%max_iterations
       problem%full_contact = task%first .and. self%full_contact
       call load_of(self, task, problem%control, problem%target)
@@ -195,6 +198,7 @@ contains
 
       problem%modulus = task%modulus
       problem%tolerance = self%tolerance
+      problem%accepted = self%accepted
       if (self%adhesive) problem%tolerance = max(self%tolerance, start_tolerance)
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height

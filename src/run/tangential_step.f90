@@ -40,7 +40,7 @@ module tangential_step
       type(grid_type) :: grid
       type(friction_law_type) :: law
       logical :: adhesive = .false.                   !! the contact has an adhesive potential
-      real(dp) :: tolerance = 1e-6_dp                 !! of the next solve
+      real(dp) :: tolerance = 1e-6_dp                 !! of the next solve; that of the case always suffices
       real(dp), allocatable :: trial(:, :, :)         !! U_T at the end of the step, m [nx, 2, rows]
       real(dp), allocatable :: slip(:, :, :)          !! of the step, m
       logical, private :: foresees = .true.           !! `slip` serves as a forecast, except with the thesis's method
@@ -95,6 +95,7 @@ contains
       call new_friction_solver(self%solver, self%grid, self%operator, error, &
          merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
       self%solver%max_iterations = case%solver%max_iterations
+      self%solver%accepted = case%solver%tolerance
       ! The passes judge by the displacements whether a step is solved.
       self%solver%settle = .false.
       self%foresees = case%solver%method /= 'thesis'

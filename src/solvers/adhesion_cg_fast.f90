@@ -172,6 +172,7 @@ contains
          call update(self, now, part, form, stretch)
          if (now%updates == most_updates .or. now%failures == 2) call refresh(self, now)
       end do
+      outcome%required = max(now%problem%tolerance, now%problem%accepted)
       if (outcome%reason /= reason_converged) call check_last_state(self, now, outcome)
       outcome%converged = outcome%reason == reason_converged
    end subroutine minimise
@@ -187,7 +188,7 @@ contains
          call measure(self%work, now)
       end if
       outcome%residual = verified_residual(self, now)
-      if (outcome%reason /= reason_detached .and. outcome%residual <= now%problem%tolerance) &
+      if (outcome%reason /= reason_detached .and. outcome%residual <= outcome%required) &
          outcome%reason = reason_converged
    end subroutine check_last_state
 

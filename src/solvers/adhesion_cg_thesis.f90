@@ -138,6 +138,9 @@ contains
          if (.not. taken) curvature = 0.0_dp
          failures = merge(0, failures + 1, taken)
       end do
+      outcome%required = max(now%problem%tolerance, now%problem%accepted)
+      if (outcome%reason /= reason_detached .and. outcome%residual <= outcome%required) &
+         outcome%reason = reason_converged
       outcome%converged = outcome%reason == reason_converged
    end subroutine iterate
 

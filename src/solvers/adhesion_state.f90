@@ -37,6 +37,7 @@ module adhesion_state
       !> prescribed, the level U - H where the gap is zero, m: the displacement minus the highest point of H.
       real(dp) :: target = 0.0_dp
       real(dp) :: tolerance = 1e-6_dp       !! of the natural residual max|min(g/z_0, G z_0/gamma_0)|
+      real(dp) :: accepted = 0.0_dp         !! if larger: what suffices where the tolerance cannot be reached
       integer :: max_iterations = 2000
       logical :: full_contact = .false.     !! start from full contact, not from the given state
       !> Highest point of H, m, set by module adhesion_cg. The methods measure heights and levels from it, so that

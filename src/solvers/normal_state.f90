@@ -30,6 +30,7 @@ module normal_state
       integer :: control = control_pressure
       real(dp) :: target = 0.0_dp           !! mean pressure, Pa, or the level U - H, m
       real(dp) :: tolerance = 1e-6_dp       !! of the duality gap and of the load
+      real(dp) :: accepted = 0.0_dp         !! if larger: what suffices where the tolerance cannot be reached
       integer :: max_iterations = 1000
       logical :: warm = .false.             !! the given pressure is a start
       logical :: displaced = .false.        !! the given gap holds the displacement U of that start
@@ -367,7 +368,8 @@ contains
       type(solver_result_type), intent(inout) :: outcome    !! with the reason for which the loop ended
       integer :: j
 
-      outcome%converged = determined .and. measure%error <= task%tolerance
+      outcome%required = max(task%tolerance, task%accepted)
+      outcome%converged = determined .and. measure%error <= outcome%required
       if (outcome%converged) outcome%reason = reason_converged
       outcome%residual = measure%error
       outcome%load_error = measure%load_error

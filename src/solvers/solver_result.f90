@@ -12,7 +12,8 @@ module solver_result
       integer(int64) :: ffts = 0                !! real n x n transforms done
       real(dp) :: residual = 0.0_dp             !! relative residual, recomputed at the end
       real(dp) :: load_error = 0.0_dp           !! relative error of the prescribed load
-      logical :: converged = .false.            !! the residual met the tolerance
+      real(dp) :: required = 0.0_dp             !! what the two errors had to meet; 0: not recorded
+      logical :: converged = .false.            !! they met it
       logical :: stopped = .false.              !! stopped (module stop_watch): the fields have no meaning
       character(128) :: reason = ''             !! why the solver returned
       real(dp) :: seconds = 0.0_dp              !! wall time of the solve
