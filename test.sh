@@ -10,6 +10,7 @@ status=0
 python tools/check_sources.py || status=1
 fortitude check --quiet || status=1
 ruff check --quiet || status=1
+mypy --no-error-summary || status=1
 
 fpm test --profile release
 # Some Python tests let the Fortran driver write results: this one, not one of another build.

@@ -27,7 +27,7 @@ lists = {
     "flat = files": present("python/src/*.f90"),
 }
 # The Python package: one list for each of its folders, that of the place where they are installed.
-kinds = ("py", "typed", "js", "css", "html")
+kinds = ("py", "pyi", "typed", "js", "css", "html")
 folders = {path.parent for kind in kinds for path in root.glob(f"python/asperity/**/*.{kind}")}
 for folder in sorted(folders):
     name = folder.relative_to(root / "python").as_posix()

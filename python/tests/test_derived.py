@@ -1,22 +1,28 @@
 """Quantities that are derived from results."""
 
+import subprocess
+
 import h5py
 import numpy as np
 import pytest
 from conftest import frictional_result, write_result
 
 import asperity
-from asperity.results.derived import (
-    closure,
-    direction,
-    energy_terms,
-    friction_outside,
+from asperity.results.derived import closure, energy_terms
+from asperity.results.road_slopes import direction, friction_outside, moved_slopes
+from asperity.results.settings import (
     has_adhesion,
     has_friction,
-    moved_slopes,
+    has_rough_road,
+    parse_settings,
+    phase_names,
     setting,
+    settings_of,
     solver_setting,
+    steady_phases,
 )
+from asperity.runs import namelists
+from asperity.views.report import settings_groups
 
 
 def with_text(path, name, text):
@@ -43,6 +49,79 @@ def test_settings_of_an_input_without_resolved_ones(result):
                     "&friction law='none' /\n&solver tolerance=2e-4/\n")
     assert has_adhesion(run) and not has_friction(run)
     assert solver_setting(run, "tolerance") == 2e-4
+
+
+# Strings hold what else would be a comment, the end of a group, a setting or another group.
+TRICKY = """&case
+  title = 'up / down: steady = .true. ! &friction law = ''none'' /'
+/
+&grid
+  nx = 32
+  lx = 0.001  ! m
+/
+&surface
+  shape = 'sine'  ! not shape = 'file'
+/
+&material
+  prony_g = 2000000, 1000000  ! Pa
+/
+&friction
+  law = 'coulomb'
+/
+&phase
+  name = 'steady = .true. /'
+  steps = 100  ! dt = 1e-5 s: steps given
+  ! pressure as in the phase before: 400000 Pa
+  steady = .false.
+/
+&phase
+  name = 'the driver''s "run" & on ! 2'
+  steady = .true.
+/
+"""
+
+
+def test_strings_do_not_confuse_the_settings(result):
+    run = with_text(result, "settings", TRICKY)
+    assert [group.name for group in settings_of(run)] == [
+        "case", "grid", "surface", "material", "friction", "phase", "phase"]
+    assert setting(run, "case", "title") == (
+        "up / down: steady = .true. ! &friction law = 'none' /")
+    assert setting(run, "friction", "law") == "coulomb" and has_friction(run)
+    assert steady_phases(run) == [2]
+    assert phase_names(run) == ["steady = .true. /", "the driver's \"run\" & on ! 2"]
+    assert not has_rough_road(run)
+    groups = dict(settings_groups(run)[:-2])
+    assert groups["grid"] == [("nx", "32"), ("lx", "0.001 m")]
+    assert groups["material"] == [("prony_g", "2000000, 1000000 Pa")]
+    first, second = (dict(values) for name, values in settings_groups(run) if name == "phase")
+    assert first == {"name": "steady = .true. /", "steps": "100 (dt = 1e-5 s: steps given)",
+                     "steady": ".false."}
+    assert second["name"] == "the driver's \"run\" & on ! 2"
+
+
+def test_the_settings_of_all_templates_are_read_like_the_input(program, tmp_path):
+    """The program's own reader and that of the results find the same groups and values."""
+    names = [line.split()[0] for line in subprocess.run(
+        [program, "template"], check=True, capture_output=True, text=True).stdout.splitlines()]
+    assert len(names) >= 7
+    for name in names:
+        text = subprocess.run([program, "template", name], check=True, capture_output=True,
+                              text=True).stdout
+        found = parse_settings(text)
+        wanted = namelists.listed(text)
+        assert [group.name for group in found] == [group for group, _ in wanted]
+        for group, (_, values) in zip(found, wanted, strict=True):
+            assert list(group.values) == list(values)
+            for variable, value in values.items():
+                values_of_list = value if isinstance(value, list) else [value]
+                for text_of_value, one in zip(group.values[variable], values_of_list, strict=True):
+                    if isinstance(one, bool):
+                        assert text_of_value == (".true." if one else ".false.")
+                    elif isinstance(one, str):
+                        assert text_of_value == one
+                    else:
+                        assert float(text_of_value) == one
 
 
 def test_friction_is_known_by_its_columns(tmp_path):

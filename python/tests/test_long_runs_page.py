@@ -50,7 +50,7 @@ def test_page(shell):
     assert done.returncode == 0 and "time steps" in done.stdout and "memory" in done.stdout
 
     small = Path("friction.nml").read_text()
-    for old, new in (("nx = 128", "nx = 64"), ("ny = 74", "ny = 37")):     # a quarter of the time
+    for old, new in (("nx = 64", "nx = 32"), ("ny = 37", "ny = 19")):      # a quarter of the time
         assert old in small
         small = small.replace(old, new)
     Path("friction.nml").write_text(small)

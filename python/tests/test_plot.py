@@ -17,7 +17,7 @@ from matplotlib.quiver import Quiver, QuiverKey
 import asperity
 from asperity.__main__ import main
 from asperity.plot import plot_history, si_scale
-from asperity.plot_fields import field_style
+from asperity.views.colour_scales import field_style
 from asperity.views.style import NO_CONTACT, SLIP, STICK
 
 
@@ -65,9 +65,23 @@ def test_map(result):
     assert "step 5" in axes.get_title()
 
 
-def test_signed_fields_have_a_symmetric_scale(result):
-    image = asperity.open(result).snapshots[-1].plot("traction_x").images[0]
-    assert image.norm.vmin == -image.norm.vmax
+def test_the_scale_of_both_signs_shows_each_of_them(result):
+    """White is zero, and each sign has half of the colours for its own values."""
+    with h5py.File(result, "a") as file:
+        pressure = file["snapshots/000005/pressure"]
+        values = pressure[()]
+        pressure[...] = np.where(values > 0.0, values, -0.15 * values.max())
+    snapshot = asperity.open(result).snapshots[-1]
+    axes = snapshot.plot("pressure")
+    norm, peak = axes.images[0].norm, 1e-3 * values.max()
+    assert (norm.vmin, norm.vmax) == pytest.approx((-0.15 * peak, peak))
+    assert np.asarray(norm([norm.vmin, 0.0, norm.vmax])) == pytest.approx([0.0, 0.5, 1.0])
+    (bar,) = (other for other in axes.figure.axes if other is not axes)
+    ticks = bar.get_yticks()
+    for part in (ticks[ticks < 0.0], ticks[ticks > 0.0]):  # both halves of the bar have numbers
+        assert len(part) and abs(part).max() <= max(-norm.vmin, norm.vmax)
+    image = snapshot.plot("traction_x").images[0]
+    assert image.norm.vmin == pytest.approx(-image.norm.vmax)  # both signs have the same size
 
 
 def legend_of(axes):
@@ -379,10 +393,11 @@ def test_data_of_one_sign_have_a_scale_of_one_sign(frictional):
     for sign in (1.0, -1.0):
         factor, _, style = field_style(
             sign * np.linspace(0.0, 2e5, 12).reshape(3, 4), "traction_x", "Pa")
-        assert sorted((style["vmin"], style["vmax"]), key=abs) == [0.0, sign * 2e5 * factor]
+        norm = style["norm"]
+        assert sorted((norm.vmin, norm.vmax), key=abs) == [0.0, sign * 2e5 * factor]
         assert "viridis" in style["cmap"]
     _, _, style = field_style(np.array([[-1.0, 2.0]]), "traction_x", "Pa")
-    assert style["vmin"] == -style["vmax"] and style["cmap"] == "RdBu_r"
+    assert (style["norm"].vmin, style["norm"].vmax) == (-2.0, 2.0) and style["cmap"] == "RdBu_r"
     assert snapshot.plot("pressure").images
 
 

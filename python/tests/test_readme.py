@@ -54,7 +54,7 @@ def test_links_lead_somewhere():
 def test_result_page_names_every_dataset(program, tmp_path):
     text = subprocess.run([program, "template", "friction"], check=True, capture_output=True,
                           text=True).stdout
-    text = text.replace("nx = 128", "nx = 32").replace("ny = 74", "ny = 18")
+    text = text.replace("nx = 64", "nx = 32").replace("ny = 37", "ny = 18")
     (tmp_path / "case.nml").write_text(text)
     subprocess.run([program, "run", "case.nml", "--quiet"], cwd=tmp_path, check=True)
     with h5py.File(tmp_path / "case.h5") as file:

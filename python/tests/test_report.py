@@ -76,7 +76,9 @@ def sliding(program, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     case = subprocess.run([program, "template", "friction"], capture_output=True, text=True,
                           check=True).stdout
-    for old, new in (("nx = 128", "nx = 48"), ("ny = 74", "ny = 28"), ("steps = 100", "steps = 5"),
+    for old, new in (("nx = 64", "nx = 48"), ("ny = 37", "ny = 28"), ("steps = 100", "steps = 5"),
+                     ("coefficient = 0.3", "coefficient = 1.0"),
+                     ("duration = 1.5e-3", "duration = 0.5e-3"),
                      ("snapshot_every = 32", "snapshot_every = 8"),
                      ("Rubber block", "Rubber <block> & {{title}}")):
         assert old in case
@@ -518,6 +520,26 @@ def test_zoom_slider_and_switch_work(browser, tmp_path, sliding):
     assert papers == ["rgb(255, 255, 255)", "rgb(20, 24, 28)", "rgb(255, 255, 255)"]
     # The test reads the canvases; the page itself does not.
     assert [text for text in browser.console() if "getImageData" not in text] == []
+
+
+@needs_browser
+def test_each_sign_of_the_pressure_has_half_of_the_colours(browser, tmp_path, result):
+    """Tensions and pressures of different size are both seen, and white stays zero."""
+    with h5py.File(result, "a") as file:
+        for group in file["snapshots"].values():
+            pressure = group["pressure"][()]
+            group["pressure"][...] = np.where(pressure > 0.0, pressure, -0.15 * pressure.max())
+    browser.window(900, 800)
+    browser.open(asperity.open(result).report(tmp_path / "page.html"))
+    wait_for(browser, READY)
+    numbers, weakest = browser.run(
+        "const map = document.querySelector('.map'), canvas = map.querySelector('canvas');"
+        " const cells = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);"
+        " let blue = 255; for (let i = 0; i < cells.data.length; i += 4)"
+        "   if (cells.data[i] < cells.data[i + 2]) blue = Math.min(blue, cells.data[i]);"
+        " return [[...map.querySelectorAll('.numbers span')].map((s) => s.textContent), blue]")
+    assert numbers == ["−30", "0", "200 kPa"]
+    assert weakest == 5  # the tension has the darkest blue of the scale
 
 
 @needs_browser

@@ -1,6 +1,7 @@
 """Means over whole laps: exact for periodic histories, with a warning for parts of laps."""
 
 import math
+import subprocess
 from types import SimpleNamespace
 
 import numpy as np
@@ -64,6 +65,52 @@ def test_the_error_is_that_of_the_laps():
     drift = steady_mean(run_of(*waves(12.0, drift=0.002)))
     scatter = 0.002 * 2 * np.pi * np.std(np.arange(11), ddof=1)
     assert drift.error > 1.5 * scatter / math.sqrt(11)
+
+
+def with_slip(run, part):
+    """Give the run friction, in which the interface slips by a part of the travel of the road."""
+    run.history["sliding_speed"] = np.concatenate([[0.0], 0.1 * np.broadcast_to(
+        part, run.history.rows - 1)])
+    run.attributes["settings"] = "&friction law = 'coulomb' /"
+    return run
+
+
+def test_a_contact_that_sticks_makes_no_laps():
+    """The road moves on for three laps, but carries the surface of the rubber along."""
+    found = steady_mean(with_slip(run_of(*waves(3.0)), 1e-4))
+    assert found.laps == 0.0 and math.isnan(found.error)
+    assert "the contact sticks" in found.note and "0.0003 laps" in found.note
+    assert found.mean == run_of(*waves(3.0)).history["friction"][-1]
+
+
+def test_laps_are_counted_by_the_slip():
+    """Half of the speed makes half of the laps; the shear of the block before it slips does not."""
+    travel, _ = waves(8.0)
+    friction = 0.3 + 0.2 * np.sin(2 * np.pi * travel / (2 * LX))
+    found = steady_mean(with_slip(run_of(travel, friction), 0.5))
+    assert found.laps == 3.0 and found.mean == pytest.approx(0.3, abs=1e-3)
+    travel, friction = waves(3.0)
+    sheared = np.where(travel < 0.03 * LX, 0.0, 1.0)
+    found = steady_mean(with_slip(run_of(travel, friction), sheared))
+    assert found.laps == 2.0 and found.note == ""
+    assert found.mean == pytest.approx(0.3, abs=1e-3)
+
+
+def test_the_page_says_that_a_contact_sticks(program, tmp_path):
+    """A thick block whose road moves by a lap is only sheared: there is no mean friction."""
+    text = subprocess.run([program, "template", "friction"], check=True, capture_output=True,
+                          text=True).stdout
+    for old, new in (("nx = 64", "nx = 24"), ("ny = 37", "ny = 14"), ("steps = 100", "steps = 4"),
+                     ("coefficient = 0.3", "coefficient = 1.0"),
+                     ("duration = 1.5e-3", "duration = 0.5e-3")):
+        assert old in text
+        text = text.replace(old, new)
+    run = asperity.run(text, output=tmp_path / "stick.h5", threads=1)
+    assert run.history["stick_area"][-1] > 0.9
+    page = run.report(tmp_path / "stick.html").read_text()
+    assert "The contact sticks at the end of the run: it has slid by " in page
+    assert "Mean friction" not in page
+    assert not any("mean" in str(line.get_label()) for line in run.plot("friction").lines)
 
 
 def test_laps_of_oblique_slides():

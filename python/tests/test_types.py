@@ -96,6 +96,13 @@ def test_mypy_knows_names_and_types(tmp_path: Path) -> None:
             assert not messages, f"{line}\n{messages}"
 
 
+def test_mypy_finds_no_fault_in_the_package() -> None:
+    """The types of the package agree with each other, and with those of NumPy and matplotlib."""
+    done = subprocess.run([sys.executable, "-m", "mypy"], cwd=ROOT, capture_output=True, text=True,
+                          check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_types_are_those_of_the_program() -> None:
     """The modules for type checkers and the page's table follow from the program's tables."""
     done = subprocess.run([sys.executable, ROOT / "tools" / "make_types.py", "--check"],

@@ -71,13 +71,13 @@ contains
          '&output|snapshot_every = 1|/|'), &
          template_type('friction', 'a rubber block that is driven over a wavy road with Coulomb friction', &
          '&case|title = ''Rubber block on a wavy road''|/|'// &
-         '&grid|nx = 128|ny = 74|lx = 500e-6|ly = 288.675e-6|/|'// &
+         '&grid|nx = 64|ny = 37|lx = 500e-6|ly = 288.675e-6|/|'// &
          '&surface|shape = ''hexagonal_wave''|amplitude = 5e-6|wavelength = 500e-6|/|'// &
          '&material|shear_modulus = 1e6|prony_g = 2e6, 1e6|prony_tau = 1e-5, 1e-3|'// &
          'thickness = 4e-3|density = 20.0|/|'// &
-         '&friction|law = ''coulomb''|coefficient = 1.0|/|'// &
+         '&friction|law = ''coulomb''|coefficient = 0.3|/|'// &
          '&phase|name = ''load''|duration = 1e-3|steps = 100|pressure = 0.4e6|/|'// &
-         '&phase|name = ''slide''|duration = 0.5e-3|velocity_x = 1.0|/|'// &
+         '&phase|name = ''slide''|duration = 1.5e-3|velocity_x = 1.0|/|'// &
          '&output|snapshot_every = 32|/|')]
    end function templates
 

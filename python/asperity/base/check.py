@@ -212,7 +212,7 @@ def array_of(
     return result
 
 
-def no_masked(name: str, values: object) -> None:
+def no_masked(name: str, values: ArrayLike) -> None:
     """Refuse an array with masked points, because the numbers below a mask are meaningless.
 
     Raises
@@ -228,7 +228,7 @@ def no_masked(name: str, values: object) -> None:
     ValueError: height: has 1 of 2 points masked: fill them first, or leave them out
     """
     if np.ma.is_masked(values):
-        count, size = int(np.ma.getmaskarray(values).sum()), int(np.size(values))
+        count, size = int(np.ma.getmaskarray(np.ma.asarray(values)).sum()), int(np.size(values))
         raise ValueError(f"{name}: has {count} of {size} points masked: fill them first, or leave"
                          " them out")
 

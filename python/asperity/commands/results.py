@@ -68,9 +68,9 @@ def _plot(chosen: argparse.Namespace) -> int:
             raise ValueError(f"{run.path}: holds no snapshots yet")
         snapshots = run.snapshots
         snapshot = snapshots[-1] if chosen.step is None else snapshots.at_step(chosen.step)
-        figure = snapshot.plot(chosen.field).figure
+        figure = snapshot.plot(chosen.field).figure.canvas.figure
     elif chosen.history:
-        figure = run.plot(chosen.history, chosen.x).figure
+        figure = run.plot(chosen.history, chosen.x).figure.canvas.figure
     else:
         figure = run.overview()
     if chosen.show:

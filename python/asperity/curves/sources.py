@@ -209,7 +209,8 @@ def _of_namelist(path: Path) -> Compound:
     group = Case.read(path).material
     spring = float(group.shear_modulus or 0.0)
     if group.zener_g0:
-        series = Prony.from_zener(spring, group.zener_g0, group.zener_g1, group.zener_eta)
+        series = Prony.from_zener(spring, group.zener_g0, group.zener_g1 or (),
+                                  group.zener_eta or ())
     else:
         series = Prony(spring, group.prony_g or (), group.prony_tau or ())
     reference = float(group.reference_temperature)

@@ -225,8 +225,8 @@ class FrictionCurve:
         for name, array in self.values.items():
             variables[name] = ((*axes, "patch"), array, described(name))
             ends = zip(("mean", "low", "high"), self.mean(name), strict=True)
-            for end, part in ends:
-                variables[f"{name}_{end}"] = (axes, part, described(name, {
+            for end, values in ends:
+                variables[f"{name}_{end}"] = (axes, values, described(name, {
                     "mean": ", mean over patches", "low": ", lower end of the 95 % interval",
                     "high": ", upper end of the 95 % interval"}[end]))
         for name, array in self.theory.items():

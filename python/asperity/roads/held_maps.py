@@ -155,7 +155,7 @@ def _write(path: Path, held: HeldMap, title: str) -> Path:
             ny, nx = held.height.shape
             lx = positive("lx", held.lx)
             ly = lx * ny / nx if held.ly is None else positive("ly", held.ly)
-            write_grid(file, held.height.shape, lx, ly, held.periodic)
+            write_grid(file, held.height.shape, lx, ly, bool(held.periodic))
             lengths = {"lx": lx, "ly": ly}
         write_height(file, held.height, **lengths)
     return path

@@ -225,7 +225,7 @@ def read_map(
             "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
             "metadata": metadata,
         }
-    array = np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan)
+    array: FloatArray = np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan)
     array = np.where(np.isfinite(array), array, np.nan)
     if array.ndim == 1:
         return (array[None, :], [lengths[0], lengths[0] / array.size], periodic,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ _LIMIT = 12.0           # in units of the usual distance of a cell from its neig
 _USUAL = 1.4826         # standard deviation over median deviation of a normal distribution
 
 
-class Outliers(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Outliers:
     """The outliers of a map.
 
     Attributes

@@ -265,11 +265,15 @@ def fit_dma(
     rms = [float(np.sqrt(np.mean(error**2))) for error in errors]
     return DmaFit(
         material, omega, storage, loss,
-        None if table.temperature is None else table.temperature[order], found.reference,
-        found.wlf, [(t, float(found.log_shift[rows[0]])) for t, rows in sweeps],
-        found.overlap_error, *rms,
-        float(max(np.abs(errors[0]).max(), np.abs(errors[1]).max())), bounded, table.name, notes,
-        [(t, float(found.log_vertical[rows[0]])) for t, rows in sweeps] if vertical else [])
+        temperature=None if table.temperature is None else table.temperature[order],
+        reference=found.reference, wlf=found.wlf,
+        shifts=[(t, float(found.log_shift[rows[0]])) for t, rows in sweeps],
+        overlap_error=found.overlap_error,
+        error_storage=rms[0], error_loss=rms[1], error_tan_delta=rms[2],
+        largest_error=float(max(np.abs(errors[0]).max(), np.abs(errors[1]).max())),
+        plateau_bounded=bounded, name=table.name, notes=notes,
+        vertical_shifts=([(t, float(found.log_vertical[rows[0]])) for t, rows in sweeps]
+                         if vertical else []))
 
 
 class _Shifted(NamedTuple):

@@ -218,9 +218,9 @@ class Groups(MutableSequence[Group]):
 
     def __init__(self, name: str, groups: Iterable[Mapping[str, Any]] = ()) -> None:
         self._name = entry_of(name).name
-        if isinstance(groups, Mapping) or is_map(groups):
-            groups = [groups]
-        self._groups = [self._group(values) for values in groups]
+        one = isinstance(groups, Mapping) or is_map(groups)
+        listed: Iterable[Any] = [groups] if one else groups
+        self._groups = [self._group(values) for values in listed]
 
     def _group(self, values: Mapping[str, Any]) -> Group:
         """Return a new group with these values; a height map is replaced by its temporary file."""

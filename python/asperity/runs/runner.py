@@ -32,8 +32,15 @@ _close = library.call("run_close")
 class _CaseLike(Protocol):
     """The part of `asperity.Case` that is needed here; its text is ``str(case)``."""
 
-    path: Path | None
-    result: Path
+    @property
+    def path(self) -> Path | None:
+        """The file of the case."""
+        ...
+
+    @property
+    def result(self) -> Path:
+        """The file of its result."""
+        ...
 
     def kept_in(self, folder: Path) -> _CaseLike:
         """Return the case with its height maps in files of a folder."""

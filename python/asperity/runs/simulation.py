@@ -43,7 +43,10 @@ _LOADS = ("pressure", "force", "displacement")
 class _CaseLike(Protocol):
     """The part of `asperity.Case` that is needed here; its text is ``str(case)``."""
 
-    path: Path | None
+    @property
+    def path(self) -> Path | None:
+        """The file of the case."""
+        ...
 
 
 class _Fields(NamedFields, Mapping[str, NDArray[Any]]):

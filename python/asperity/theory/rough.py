@@ -78,7 +78,9 @@ def _spectrum(wavenumber: ArrayLike, psd: ArrayLike) -> _Spectrum:
     if not np.any(present):
         raise ValueError("psd: all values are 0.0: must have one > 0")
     knots, level = np.log(k), np.log(np.where(present, phi, 1.0))
-    low, high, start, rise = [], [], [], []
+    low: list[float] = []
+    high: list[float] = []
+    start, rise = [], []
     for i in range(k.size - 1):
         a, b = knots[i], knots[i + 1]
         if present[i] and present[i + 1]:

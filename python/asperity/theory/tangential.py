@@ -176,6 +176,7 @@ def mindlin(
     normal = hertz(radius, 2.0 * g / (1.0 - nu), force=positive("force", force))
     a, bound = normal.contact_radius, mu * normal.force
     slide = 3.0 * bound * (2.0 - nu) / (16.0 * a * g)
+    given: ArrayLike
     name, given = exactly_one(tangential=tangential, shift=shift)
     by_force, path = name == "tangential", array_of(name, given)
     if path.ndim > 1 or path.size == 0:

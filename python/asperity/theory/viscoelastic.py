@@ -190,7 +190,7 @@ def lee_radok(
     if t.size == 0:
         raise ValueError("times: has no value, must have at least one")
     load, knots = _force_history(force, t)
-    if knots is not None and np.ndim(force) == 1 and t[0] != 0.0:
+    if not callable(force) and np.ndim(force) == 1 and t[0] != 0.0:
         raise ValueError(f"times[0] = {float(t[0])!r}: must be 0 where force is an array")
     theta, compliance = material.retardation_times, material.retardation_compliances
     glassy, fluidity = 1.0 / material.instantaneous_modulus, material.fluidity

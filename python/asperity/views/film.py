@@ -11,12 +11,13 @@ import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
-from PIL.Image import Dither, Quantize
+from PIL.Image import Dither, Image, Quantize
 
-from ..results.derived import has_friction
+from ..results.settings import has_friction
 from ..results.steady import steady_speeds
-from .plot import horizontal, steady_words
-from .plot_fields import field_style, frame_of, state_style, without_open_cells
+from .colour_scales import field_style, mark_scale, state_style, without_open_cells
+from .plot_fields import frame_of
+from .plot_history import horizontal, steady_words
 from .style import (
     COLOURS,
     DOUBLE_COLUMN,
@@ -80,12 +81,14 @@ def film(run: Run, path: Path, field: str | None = None, *,
         field = "contact" if has_friction(run) and "contact" in run.snapshots[0] else "pressure"
     if frames_per_second is None:
         frames_per_second = float(np.clip(len(run.snapshots) / SHORTEST, 2.0, 12.0))
+    # Matplotlib's types ask for a whole number, but its writers take any.
+    speed: dict[str, Any] = {"fps": frames_per_second}
     if path.suffix.lower() == ".mp4":
         if not FFMpegWriter.isAvailable():
             raise OSError(f"{path}: ffmpeg is not installed: write a .gif")
-        writer: Any = FFMpegWriter(fps=frames_per_second)
+        writer: Any = FFMpegWriter(**speed)
     else:
-        writer = _GifWriter(64 if field == "contact" else 256, frames_per_second)
+        writer = _GifWriter(64 if field == "contact" else 256, **speed)
     with print_style():
         animation, figure = _animation(run, field)
         animation.save(path, writer=writer, dpi=110)
@@ -102,11 +105,13 @@ class _GifWriter(PillowWriter):
     ----------
     colours : int
         Number of colours, up to 256.
-    fps : float
+    fps : int
         Number of frames per second.
     """
 
-    def __init__(self, colours: int, fps: float) -> None:
+    _frames: list[Image]
+
+    def __init__(self, colours: int, fps: int) -> None:
         super().__init__(fps=fps)
         self.colours = colours
 
@@ -140,8 +145,8 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
         image = panel.imshow(without_open_cells(snapshots[0][field] * factor, field),
                              origin="lower", extent=edges, **style)
         tall = float(np.clip(grid.ly / grid.lx, 0.1, 2.5))  # the bar is as tall as the map
-        figure.colorbar(image, ax=panel, fraction=0.046 * tall, pad=0.03).set_label(
-            axis_text(label_of(field, snapshots[0]), scale_unit))
+        bar = figure.colorbar(image, ax=panel, fraction=0.046 * tall, pad=0.03)
+        mark_scale(bar, axis_text(label_of(field, snapshots[0]), scale_unit))
     panel.set_xlabel(f"x ({unit})")
     panel.set_ylabel(f"y ({unit})")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ NUMBER = f"{CELL};white-space:nowrap"
 POINTS = 120  # largest number of points of a small curve
 
 
-def table_html(head: tuple[str, ...], rows: list[tuple[str, ...]], caption: str) -> str:
+def table_html(head: tuple[str, ...], rows: Sequence[tuple[str, ...]], caption: str) -> str:
     """Return a table, whose cells are already HTML."""
     top = "".join(f'<th style="{CELL}">{name}</th>' for name in head)
     # Only the last column has texts that may be wrapped.

@@ -7,12 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 from matplotlib.transforms import ScaledTranslation
 from numpy.typing import NDArray
 
-from ..results.derived import has_friction
+from ..results.settings import has_friction
+from .colour_scales import (
+    field_style,
+    mark_scale,
+    scale_limit,
+    state_style,
+    typical_value,
+    without_open_cells,
+)
 from .style import (
     COLOURS,
     NO_CONTACT,
@@ -22,9 +29,7 @@ from .style import (
     axis_text,
     label_of,
     print_style,
-    scale_limit,
     si_scale,
-    typical_value,
     when,
 )
 
@@ -32,12 +37,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..results import Grid, Snapshot
-    from ..results.result_file import ResultFile
 
-__all__ = ["field_style", "frame_of", "plot_field", "plot_section", "state_style",
-           "without_open_cells"]
+__all__ = ["frame_of", "plot_field", "plot_section"]
 
-SIGNED = ("traction_x", "traction_y", "slip_x", "slip_y", "displacement_x", "displacement_y")
 ARROWS = 22  # along the longer side
 
 
@@ -145,71 +147,9 @@ def frame_of(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]
         Edges of the outer cells in this unit: left, right, bottom, top.
     """
     length, unit = si_scale([grid.lx, grid.ly], "m")
-    edges = length * np.array([-0.5 * grid.dx, grid.lx - 0.5 * grid.dx,
-                               -0.5 * grid.dy, grid.ly - 0.5 * grid.dy])
-    return length, unit, tuple(map(float, edges))  # type: ignore[return-value]
-
-
-def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str, dict[str, Any]]:
-    """Return factor and unit of the colour scale of a field, and arguments of imshow.
-
-    The scale of a field with both signs is white at zero. The scale of one sign begins at zero.
-
-    Parameters
-    ----------
-    field : ndarray
-        Values, shape (ny, nx), in `units`.
-    name : str
-        Name of the field, such as ``"pressure"``.
-    units : str
-        SI unit of the field.
-
-    Returns
-    -------
-    factor : float
-        Values times this factor are in the unit.
-    unit : str
-        The unit of the colour scale, such as ``"MPa"``.
-    style : dict
-        The arguments ``cmap``, ``vmin`` and ``vmax`` of `imshow`, in this unit.
-    """
-    factor, unit = si_scale(typical_value(field), units)
-    low, high = float(field.min()) * factor, float(field.max()) * factor
-    limit = scale_limit(np.abs(field)) * factor
-    if name in SIGNED or (name == "pressure" and low < 0.0):
-        if low >= -1e-3 * limit:
-            return factor, unit, {"cmap": "viridis", "vmin": 0.0, "vmax": limit}
-        if high <= 1e-3 * limit:
-            return factor, unit, {"cmap": "viridis_r", "vmin": -limit, "vmax": 0.0}
-        return factor, unit, {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
-    if name == "pressure":
-        cmap = plt.get_cmap("viridis").with_extremes(bad=NO_CONTACT)
-        return factor, unit, {"cmap": cmap, "vmin": 0.0,
-                              "vmax": scale_limit(field[field > 0.0]) * factor}
-    if low == high:  # for example the gap in full contact
-        return factor, unit, {"cmap": "cividis", "vmin": min(0.0, low),
-                              "vmax": max(0.0, low) or 1.0}
-    return factor, unit, {"cmap": "cividis", "vmin": low, "vmax": high}
-
-
-def without_open_cells(field: NDArray[Any], name: str) -> NDArray[Any]:
-    """Return a field for a picture, in which cells out of contact are masked.
-
-    Parameters
-    ----------
-    field : ndarray
-        Values, shape (ny, nx).
-    name : str
-        Name of the field. Only ``"pressure"`` without tension is masked, where it is zero.
-
-    Returns
-    -------
-    ndarray
-        The masked field, or the field itself.
-    """
-    if name == "pressure" and field.min(initial=0.0) >= 0.0:
-        return np.ma.masked_less_equal(field, 0.0)
-    return field
+    edges = (length * -0.5 * grid.dx, length * (grid.lx - 0.5 * grid.dx),
+             length * -0.5 * grid.dy, length * (grid.ly - 0.5 * grid.dy))
+    return length, unit, edges
 
 
 def _bar_lies(text: str, ratio: float, width: float) -> bool:
@@ -223,9 +163,9 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
     factor, unit, style = field_style(field, name, units)
     shown = without_open_cells(field * factor, name)
     scaled = (float(field.min()) * factor, float(field.max()) * factor)
-    slack = 1e-9 * (style["vmax"] - style["vmin"])
-    above = scaled[1] > style["vmax"] + slack
-    below = style["vmin"] < 0.0 and scaled[0] < style["vmin"] - slack
+    low, high = style["norm"].vmin, style["norm"].vmax
+    slack = 1e-9 * (high - low)
+    above, below = scaled[1] > high + slack, low < 0.0 and scaled[0] < low - slack
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min",
               (True, True): "both"}[above, below]
     _, length_unit, edges = frame_of(grid)
@@ -238,26 +178,9 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
     bar = axes.figure.colorbar(image, ax=axes, extend=extend,
                                **({"orientation": "horizontal", "pad": 0.12} if lies
                                   else {"fraction": 0.046 * ratio, "pad": 0.03}))
-    bar.set_label(text)
+    mark_scale(bar, text)
     axes.set_xlabel(f"x ({length_unit})")
     axes.set_ylabel(f"y ({length_unit})")
-
-
-def state_style(run: ResultFile) -> dict[str, Any]:
-    """Return arguments of imshow for the map of open, sticking and slipping cells.
-
-    Parameters
-    ----------
-    run : ResultFile
-        The result; without friction, sticking and slipping cells have the same colour.
-
-    Returns
-    -------
-    dict
-        The arguments ``cmap`` and ``norm`` of `imshow`, for the values 0, 1 and 2.
-    """
-    colours = [NO_CONTACT, STICK, SLIP] if has_friction(run) else [NO_CONTACT, STICK, STICK]
-    return {"cmap": ListedColormap(colours), "norm": BoundaryNorm([-0.5, 0.5, 1.5, 2.5], 3)}
 
 
 def _states(snapshot: Snapshot, contact: NDArray[Any]) -> tuple[list[str], list[str]]:

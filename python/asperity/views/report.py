@@ -15,7 +15,8 @@ import numpy as np
 
 from ..base.library import version
 from ..base.names import counted
-from ..results.derived import closure, energy_terms, has_friction, missing_work, solver_setting
+from ..results.derived import closure, energy_terms, missing_work
+from ..results.settings import has_friction, parse_settings, phase_names, solver_setting
 from ..results.standing import (
     duration,
     held,
@@ -28,8 +29,8 @@ from ..results.standing import (
 )
 from ..results.steady import steady_mean, steady_rows
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
-from .report_data import faulty, now, page_data, phase_names
-from .style import si_scale, typeset
+from .report_data import faulty, now, page_data
+from .style import sentence, si_scale, typeset
 
 if TYPE_CHECKING:
     from ..results import Run
@@ -204,10 +205,10 @@ def _last(run: Run, name: str) -> str:
 
 
 def _mean_friction(run: Run) -> str:
-    """Return the mean friction over complete laps, or a remark if there are none."""
+    """Return the mean friction over complete laps, or a remark if there is none."""
     found = steady_mean(run, "friction")
     if not found.laps:
-        return ""
+        return f'\n<p class="soft">{escape(sentence(found.note))}.</p>'
     if np.isinf(found.laps):
         return '\n<p class="soft">The last row is steady sliding: the state after all laps.</p>'
     mean = escape(f"{found.mean:.4g}".replace("-", "−"))
@@ -254,17 +255,14 @@ def _table(caption: str, rows: list[tuple[str, str]]) -> str:
 def settings_groups(run: Run) -> list[tuple[str, list[tuple[str, str]]]]:
     """Return the groups of the resolved settings, each with its variables in words."""
     groups = []
-    text = str(run.attributes.get("settings", ""))
-    for name, body in re.findall(r"(?ms)^&(\w+)\b(.*?)^/", text):
+    for group in parse_settings(str(run.attributes.get("settings", ""))):
         variables = []
-        for line in body.splitlines():
-            found = re.match(r"\s*(\w+) = (.*?)\s*(?:! (.*))?$", line)
-            if found:
-                value, comment = found[2].strip("'"), found[3] or ""
-                if comment:
-                    value += f" ({comment})" if "=" in comment else f" {comment}"
-                variables.append((found[1], typeset(value)))
-        groups.append((name, variables))
+        for name, values in group.values.items():
+            value, note = ", ".join(values), group.notes.get(name, "")
+            if note:
+                value += f" ({note})" if "=" in note else f" {note}"
+            variables.append((name, typeset(value)))
+        groups.append((group.name, variables))
     return groups
 
 

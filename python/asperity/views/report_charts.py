@@ -7,15 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results.derived import (
-    closure,
-    energy_terms,
-    friction_outside,
-    has_adhesion,
-    has_friction,
-    road_speed,
-    solver_setting,
-)
+from ..results.derived import closure, energy_terms, road_speed
+from ..results.road_slopes import friction_outside
+from ..results.settings import has_adhesion, has_friction, solver_setting
 from ..results.steady import steady_speeds
 from .style import LABELS
 

@@ -6,24 +6,23 @@ All values are in SI units; the page adds the prefixes.
 from __future__ import annotations
 
 import base64
-import re
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results.derived import (
-    has_friction,
-    travel,
-)
+from ..results.derived import travel
+from ..results.settings import has_friction
 from ..roads import surface
+from .colour_scales import scale_ends
 from .plot_fields import traction_samples
 from .report_charts import MOST_SNAPSHOTS, charts_of
 from .style import label_of
 
 if TYPE_CHECKING:
     from ..results import Run, Snapshot
+    from ..results.result_file import ResultFile
 
 __all__ = ["page_data"]
 
@@ -242,7 +241,7 @@ def _sums(field: FloatArray, block: int) -> FloatArray:
 
 
 def packed(field: FloatArray) -> dict[str, Any]:
-    """Return a field as 16-bit integers between its extremes, in base 64.
+    """Return a field as 16-bit integers between its extremes, in base 64, and its colour scale.
 
     Cells that are not finite get the smallest value; `faulty` reports them.
     """
@@ -252,8 +251,9 @@ def packed(field: FloatArray) -> dict[str, Any]:
     low, high = float(field.min()), float(field.max())
     step = (high - low) / 65535.0
     whole = np.zeros(field.shape) if step == 0.0 else np.rint((field - low) / step)
-    top = float(np.percentile(np.abs(field[field != 0.0]), 99.5)) if np.any(field) else 0.0
-    return {"low": low, "high": high, "top": top, "data": _encoded(whole.astype("<u2"))}
+    bottom, top = scale_ends(field)
+    return {"low": low, "high": high, "bottom": bottom, "top": top,
+            "data": _encoded(whole.astype("<u2"))}
 
 
 def _encoded(values: NDArray[Any]) -> str:
@@ -261,7 +261,7 @@ def _encoded(values: NDArray[Any]) -> str:
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")
 
 
-def _spectrum(run: Run, field: FloatArray) -> dict[str, Any] | None:
+def _spectrum(run: ResultFile, field: FloatArray) -> dict[str, Any] | None:
     """Return the radially averaged power spectral density, in bins of equal ratio."""
     if not np.all(np.isfinite(field)) or np.ptp(field) == 0.0:
         return None
@@ -295,13 +295,6 @@ def _modulus(run: Run) -> dict[str, Any] | None:
     storage = spring + np.sum(arms * product**2 / (1.0 + product**2), axis=1)
     loss = np.sum(arms * product / (1.0 + product**2), axis=1)
     return {"omega": _numbers(omega), "storage": _numbers(storage), "loss": _numbers(loss)}
-
-
-def phase_names(run: Run) -> list[str]:
-    """Return the names of the phases in the resolved settings."""
-    text = str(run.attributes.get("settings", ""))
-    return [(re.search(r"(?m)^\s*name = '(.*)'", body) or ["", ""])[1]
-            for body in re.findall(r"(?ms)^&phase\b(.*?)^/", text)]
 
 
 def now() -> str:

@@ -9,16 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.typing import RcKeyType
 
     from ..results import Snapshot
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
            "STICK", "axis_text", "check_picture", "label_of", "print_style", "save_picture",
-           "scale_limit", "sentence", "shown_once", "si_scale", "typeset", "typical_value", "when"]
+           "sentence", "shown_once", "si_scale", "typeset", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -28,7 +29,7 @@ PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: 
 
 # Widths of the columns of a journal, inches (89 and 183 mm), and suitable sizes of text and lines.
 SINGLE_COLUMN, DOUBLE_COLUMN = 3.5, 7.2
-PRINT: dict[str, Any] = {
+PRINT: dict[RcKeyType, Any] = {
     "font.size": 8.0, "axes.titlesize": 8.0, "axes.labelsize": 8.0, "legend.fontsize": 7.0,
     "xtick.labelsize": 7.0, "ytick.labelsize": 7.0, "figure.titlesize": 9.0,
     "axes.linewidth": 0.6, "lines.linewidth": 1.2, "lines.markersize": 3.5, "grid.linewidth": 0.5,
@@ -193,22 +194,6 @@ def when(snapshot: Snapshot) -> str:
         return f"step {snapshot.step}"
     factor, unit = si_scale(snapshot.time, "s")
     return f"step {snapshot.step}, t = {snapshot.time * factor:.4g} {unit}"
-
-
-def scale_limit(values: NDArray[Any]) -> float:
-    """Return the end of a colour scale: the largest value, but without a few extreme cells."""
-    if values.size == 0:
-        return 1.0
-    largest, most = float(values.max()), float(np.percentile(values, 99.5))
-    if largest == 0.0:
-        return 1.0
-    return largest if largest < 1.5 * most or most == 0.0 else most
-
-
-def typical_value(field: NDArray[Any]) -> float:
-    """Return the value that determines the prefix of a colour bar."""
-    positive = np.abs(field[np.nonzero(field)])
-    return scale_limit(positive) if positive.size else 0.0
 
 
 @contextmanager

@@ -123,7 +123,7 @@ function pointMap() {
     const top = field.top || 1;
     map.show((i) => values[i] > 0 ? colourAt(data.colours.pressure, values[i] / top) : OPEN,
       (i) => values[i] > 0 ? shown(values[i], "Pa") : "no contact",
-      colourBar(data.colours.pressure, 0, top, "Pa", true), null, values, "Pa");
+      colourBar(data.colours.pressure, [0, top / 2, top], "Pa", true), null, values, "Pa");
   };
 }
 

@@ -231,17 +231,15 @@ class FieldMap {
 }
 
 /** The elements of a colour bar. */
-function colourBar(table, low, high, unit, open) {
+function colourBar(table, [low, middle, high], unit, open) {
   if (!(high > low)) return [html("div", {class: "key"}, `${shown(low, unit)} everywhere`)];
   const [factor, name] = siScale(Math.max(Math.abs(low), Math.abs(high)), unit);
   const scale = html("div", {class: "scale"});
   scale.style.background = `linear-gradient(to right, ${table.join(",")})`;
   scale.dataset.colours = table.join(",");
   const numbers = html("div", {class: "numbers"});
-  for (const value of [low, (low + high) / 2, high]) {
-    // The middle of a scale of both signs is zero but for round-off and for peaks that miss the cells.
-    const round = Math.abs(value) < 5e-4 * (high - low) ? 0 : value;
-    numbers.append(html("span", {}, digits(round * factor, 3)));
+  for (const value of [low, middle, high]) {
+    numbers.append(html("span", {}, digits(value * factor, 3)));
   }
   numbers.lastChild.textContent += name ? ` ${name}` : "";
   const parts = [scale, numbers];

@@ -71,21 +71,26 @@ function areaMaps(parent, same) {
       maps[name].figure.hidden = !field;
       if (!field) continue;
       const values = unpack(field);
-      const attracted = same() ? Math.min(...data.snapshots.filter((each) => name in each.fields)
-        .map((each) => each.fields[name].low)) < 0 : field.low < 0;
-      let top = same() ? overAll(name, (each) => each.top) : field.top;
-      let low = name === "pressure" && attracted ? -top : Math.min(0, field.low);
-      if (name === heights) {
-        top = same() ? overAll(name, (each) => each.high) : field.high;
-        low = same() ? -overAll(name, (each) => -each.low) : field.low;
+      const [first, last] = name === heights ? ["low", "high"] : ["bottom", "top"];
+      let top = same() ? overAll(name, (each) => each[last]) : field[last];
+      let low = same() ? -overAll(name, (each) => -each[first]) : field[first];
+      const attracted = name === "pressure" && low < 0;
+      if (attracted) {  // each sign has half of the colours, as in `colour_scales.py`
+        const largest = Math.max(top, -low);
+        const end = (size) => size >= largest / 2 ? largest : Math.max(size, largest / 10);
+        [low, top] = [-end(-low), end(top)];
       }
+      const middle = attracted ? 0 : (low + top) / 2;
+      const part = (value) => value < middle ? 0.5 * (value - low) / (middle - low || 1)
+        : 0.5 + 0.5 * (value - middle) / (top - middle || 1);
       const table = data.colours[name === "pressure" ? (attracted ? "both" : "pressure") : "gap"];
       const colours = [...Array(256).keys()].map((i) => colourAt(table, i / 255));
       const masked = name === "pressure" && !attracted;
       maps[name].show(
         (i) => masked && values[i] <= 0 ? OPEN
-          : colours[Math.min(Math.max(Math.round((values[i] - low) / (top - low || 1) * 255), 0), 255)],
-        (i) => shown(values[i], field.units), colourBar(table, low, top, field.units, masked),
+          : colours[Math.min(Math.max(Math.round(part(values[i]) * 255), 0), 255)],
+        (i) => shown(values[i], field.units),
+        colourBar(table, [low, middle, top], field.units, masked),
         null, values, field.units);
     }
     if (!maps.contact) return;
