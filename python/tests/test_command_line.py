@@ -327,6 +327,26 @@ def test_info(program, tmp_path):
     assert call(program, "info", path).returncode == 3
 
 
+def test_info_of_other_files(program, tmp_path):
+    """A map of another program is one too, its line for the input is right, others are named."""
+    road = tmp_path / "Persson's road.h5"
+    with h5py.File(road, "w") as file:
+        file["surface"] = np.arange(32.0).reshape(4, 8)
+    done = call(program, "info", road)
+    assert done.returncode == 0 and "8 x 4 cells" in done.out, done.err
+    line = done.out.split("to use it ")[1].strip()
+    assert line == f"&surface shape = 'file', file = '{tmp_path}/Persson''s road.h5' /"
+    case = (f"&grid nx = 8, ny = 4, lx = 1e-3 /\n{line}\n&material shear_modulus = 1e6 /\n"
+            "&phase pressure = 1e4 /\n")
+    assert "Persson''s road.h5" in check(program, tmp_path, case).out
+    other = tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["numbers"] = np.zeros(3)
+    done = call(program, "info", other)
+    assert done.returncode == 3
+    assert "is neither a result nor a height map" in done.err
+
+
 # Hypothesis makes these inputs. The program may accept one that is right; it must never crash.
 
 lines = settings(

@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: add_line, exact_text, in_one_line, lower, nearest_name, next_line, to_text
+   public :: add_line, exact_text, in_one_line, in_quotes, lower, nearest_name, next_line, to_text
 
    !> Convert a number to a short text.
    interface to_text
@@ -35,6 +35,20 @@ contains
       line = text(at:at + length - 1)
       at = at + length + 1
    end subroutine next_line
+
+   !> A text as a string of an input, in quotes; a quote inside is doubled.
+   pure function in_quotes(text) result(string)
+      character(*), intent(in) :: text
+      character(:), allocatable :: string
+      integer :: i
+
+      string = ''''
+      do i = 1, len(text)
+         string = string//text(i:i)
+         if (text(i:i) == '''') string = string//''''
+      end do
+      string = string//''''
+   end function in_quotes
 
    !> The word with its ASCII letters in lower case.
    pure function lower(word) result(lowered)

@@ -11,7 +11,7 @@ module case_report
    use shear_laws, only : law_uses
    use surface_settings, only : real_variable, surface_settings_type
    use surface_shapes, only : find_shape, shape_type
-   use text_tools, only : exact_text, to_text
+   use text_tools, only : exact_text, in_quotes, to_text
    implicit none
    private
 
@@ -315,15 +315,8 @@ contains
    pure function string(name, value) result(text)
       character(*), intent(in) :: name, value
       character(:), allocatable :: text
-      character(:), allocatable :: quoted
-      integer :: i
 
-      quoted = ''
-      do i = 1, len_trim(value)
-         quoted = quoted//value(i:i)
-         if (value(i:i) == '''') quoted = quoted//''''
-      end do
-      text = line(name, ''''//quoted//'''', '')
+      text = line(name, in_quotes(trim(value)), '')
    end function string
 
 end module case_report

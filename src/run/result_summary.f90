@@ -5,12 +5,12 @@
 module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
-   use asperity_errors, only : error_file, error_type, fail
+   use asperity_errors, only : error_file, error_memory, error_type, fail
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp
    use result_check, only : damage_type, find_damage
    use result_target, only : damage_of_result
-   use text_tools, only : in_one_line, to_text
+   use text_tools, only : in_one_line, in_quotes, to_text
    implicit none
    private
 
@@ -34,11 +34,16 @@ contains
       if (allocated(error)) return
       call file%open(path, 'read', error)
       if (allocated(error)) return
-      if (file%has_attribute('/', 'finished') .or. .not. file%has_dataset('/surface/height')) then
+      if (file%has_attribute('/', 'finished')) then
          call describe(file, path, text, error)
          if (.not. allocated(error)) call add_damage(file, path, text, error)
+      else if (file%has_dataset('/surface/height')) then
+         call describe_map(file, path, '/surface/height', text, error)
+      else if (file%has_dataset('/surface')) then
+         call describe_map(file, path, '/surface', text, error)
       else
-         call describe_map(file, path, text, error)
+         call fail(error, error_file, path//': is neither a result nor a height map: it has no attribute ''finished'''// &
+            ' and no dataset surface/height or surface')
       end if
       call file%close(ignored)
    end subroutine summarise_result
@@ -72,24 +77,30 @@ contains
       call fail(error, error_file, path//': the file is damaged: '//part)
    end subroutine add_damage
 
-   !> Summarise a height map that `asperity import` or `asperity.surface.save` has written.
-   subroutine describe_map(file, path, text, error)
+   !> Summarise a height map that `asperity import`, `asperity.surface.save` or another program has written.
+   subroutine describe_map(file, path, dataset, text, error)
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: path
+      character(*), intent(in) :: dataset            !! that holds the heights
       character(:), allocatable, intent(inout) :: text
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: extent(:)
+      integer :: status
       character(:), allocatable :: boundary
       real(dp) :: lx, ly
       real(dp), allocatable :: height(:, :)
 
-      call file%dataset_shape('/surface/height', extent)
+      call file%dataset_shape(dataset, extent)
       call file%report(error)
       if (.not. allocated(error) .and. size(extent) /= 2) call fail(error, error_file, path// &
-         ': /surface/height: is no map: it has '//to_text(size(extent))//' dimensions')
+         ': '//dataset//': is no map: it has '//to_text(size(extent))//' dimensions')
       if (allocated(error)) return
-      allocate (height(extent(1), extent(2)))
-      call file%read('/surface/height', height)
+      allocate (height(extent(1), extent(2)), stat=status)
+      if (status /= 0) then
+         call fail(error, error_memory, path//': not enough memory to read the heights')
+         return
+      end if
+      call file%read(dataset, height)
       text = 'file        '//path//nl//'holds       a height map'//nl//attribute_line(file, 'title', 'title       ', 200) &
          //'grid        '//to_text(extent(1))//' x '//to_text(extent(2))//' cells'
       if (file%has_attribute('/grid', 'lx') .and. file%has_attribute('/grid', 'ly')) then
@@ -102,7 +113,7 @@ contains
          ' m, rms '//to_text(sqrt(sum((height - sum(height)/size(height))**2)/size(height)))//' m'//nl
       text = text//attribute_line(file, 'steps_text', 'processing  ', 400)
       call file%report(error)
-      text = text//'to use it   &surface shape = ''file'', file = '''//path//''' /'//nl
+      text = text//'to use it   &surface shape = ''file'', file = '//in_quotes(path)//' /'//nl
    end subroutine describe_map
 
    !> The line for an attribute of the file, whose own lines are separated by semicolons; '' if there is no such
