@@ -59,6 +59,22 @@ def test_frames_have_one_unit_of_time_and_one_scale(road):
     animation._draw_was_started = True  # the frames were drawn by hand
 
 
+def test_steps_are_whole_numbers(tmp_path):
+    """A run without time is drawn over its steps, whose axis has no halves."""
+    run = asperity.open(write_result(tmp_path / "load.h5", rows=3))
+    animation, figure = _animation(run, "pressure")
+    curve = figure.axes[1]
+    assert curve.get_xlabel() == "step"
+    for axes in (curve, run.plot("contact_area", "step")):
+        axes.figure.canvas.draw()
+        ticks = axes.get_xticks()
+        assert len(ticks) >= 3 and np.all(ticks == np.round(ticks))
+    animation._func(1)
+    (mark,) = (line for line in curve.lines if line.get_marker() == "o")
+    assert mark.get_xydata().tolist() == [[2.0, run.history["contact_area"][2]]]
+    animation._draw_was_started = True  # the frames were drawn by hand
+
+
 def test_the_colour_bar_is_as_tall_as_a_flat_map(tmp_path):
     write_result(tmp_path / "flat.h5", nx=60, ny=12, lx=6e-3, ly=1.2e-3)
     animation, figure = _animation(asperity.open(tmp_path / "flat.h5"), "gap")

@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from PIL.Image import Dither, Image, Quantize
 
@@ -33,6 +34,9 @@ from .style import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
     from ..results import Run, Snapshot
 
 __all__ = ["film"]
@@ -150,21 +154,7 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     panel.set_xlabel(f"x ({unit})")
     panel.set_ylabel(f"y ({unit})")
 
-    history = run.history
-    column = "friction" if np.any(history["friction"]) else "contact_area"
-    if steady_speeds(run) is not None:
-        along, label, log = horizontal(run)
-    else:
-        name = "time" if np.ptp(history["time"]) > 0.0 else "step"
-        scale, along_unit = si_scale(history[name], history.units(name))
-        along, label, log = history[name] * scale, axis_text(LABELS[name], along_unit), False
-    curve.plot(along, history[column], color=COLOURS[0])
-    (mark,) = curve.plot([], [], "o", color=COLOURS[1])
-    curve.set_xlabel(label)
-    if log:
-        curve.set_xscale("log")
-    curve.set_ylabel(axis_text(LABELS[column], ""))
-    curve.grid(alpha=0.3)
+    along, column, mark = _curve(run, curve)
     curve.set_box_aspect(max(ratio, 0.6))
     if run.title:
         figure.suptitle(run.title, parse_math=False)
@@ -178,12 +168,34 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
         values = snapshot[field]
         image.set_data(values if field == "contact"
                        else without_open_cells(values * factor, field))
-        row = int(np.searchsorted(history["step"], snapshot.step))
-        mark.set_data([along[row]], [history[column][row]])
+        row = int(np.searchsorted(run.history["step"], snapshot.step))
+        mark.set_data([along[row]], [column[row]])
         title.set_text(_moment(snapshot, snapshots[-1]))
         return image, mark, title
 
     return FuncAnimation(figure, draw, frames=len(snapshots), blit=False), figure
+
+
+def _curve(run: Run, curve: Axes) -> tuple[NDArray[Any], NDArray[Any], Line2D]:
+    """Draw friction or contact area; return the values of both axes, and the mark of a moment."""
+    history = run.history
+    column = "friction" if np.any(history["friction"]) else "contact_area"
+    if steady_speeds(run) is not None:
+        along, label, log = horizontal(run)
+    else:
+        name = "time" if np.ptp(history["time"]) > 0.0 else "step"
+        scale, along_unit = si_scale(history[name], history.units(name))
+        along, label, log = history[name] * scale, axis_text(LABELS[name], along_unit), False
+        if name == "step":
+            curve.xaxis.set_major_locator(MaxNLocator(integer=True))
+    curve.plot(along, history[column], color=COLOURS[0])
+    (mark,) = curve.plot([], [], "o", color=COLOURS[1])
+    curve.set_xlabel(label)
+    if log:
+        curve.set_xscale("log")
+    curve.set_ylabel(axis_text(LABELS[column], ""))
+    curve.grid(alpha=0.3)
+    return along, history[column], mark
 
 
 def _sample(snapshots: list[Snapshot], field: str) -> NDArray[Any]:

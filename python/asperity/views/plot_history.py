@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..base.names import UnknownNameError, unknown_name
@@ -88,6 +89,8 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
         axes.set_xlabel(label)
         if log:
             axes.set_xscale("log")
+        if x == "step":
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         if run.title and ax is None:
             above = axes.get_legend()
             count = 0 if above is None else len(above.get_texts())

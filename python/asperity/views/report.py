@@ -216,8 +216,9 @@ def _mean_friction(run: Run) -> str:
         return f'\n<p class="soft">Mean friction {mean}: {escape(found.note)}.</p>'
     error = "" if np.isnan(found.error) else f" ± {found.error:.2g}"
     note = f"; {escape(found.note)}" if found.note else ""
-    return (f'\n<p class="soft">Mean friction over the last'
-            f" {counted(round(found.laps), 'lap')} of the road: {mean}{error}{note}.</p>")
+    laps = "lap" if found.laps == 1.0 else counted(round(found.laps), "lap")
+    return (f'\n<p class="soft">Mean friction over the last {laps} of the road:'
+            f" {mean}{error}{note}.</p>")
 
 
 def _sections(run: Run, data: dict[str, Any]) -> list[tuple[str, str, str]]:

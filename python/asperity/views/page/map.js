@@ -239,7 +239,9 @@ function colourBar(table, [low, middle, high], unit, open) {
   scale.dataset.colours = table.join(",");
   const numbers = html("div", {class: "numbers"});
   for (const value of [low, middle, high]) {
-    numbers.append(html("span", {}, digits(value * factor, 3)));
+    // The middle of heights of both signs is zero but for round-off and for peaks that miss the cells.
+    const round = Math.abs(value) < 5e-4 * (high - low) ? 0 : value;
+    numbers.append(html("span", {}, digits(round * factor, 3)));
   }
   numbers.lastChild.textContent += name ? ` ${name}` : "";
   const parts = [scale, numbers];
