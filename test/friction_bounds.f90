@@ -42,7 +42,7 @@ contains
          do i = 1, size(p, 1)
             t = 0.0_dp
             if (contact(i, j) /= 0_int8) then
-               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+               if (law%slope_effect) slope = [slope_x(i, j), slope_y(i, j)]
                t = [tx(i, j), ty(i, j)]
                call return_to_bound(law, p(i, j), slope, t, returned)
             end if
@@ -77,7 +77,7 @@ contains
                tx(i, j) = 0.0_dp
                ty(i, j) = 0.0_dp
             else
-               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+               if (law%slope_effect) slope = [slope_x(i, j), slope_y(i, j)]
                t = [tx(i, j), ty(i, j)]
                call return_to_bound(law, p(i, j), slope, t, returned)
                if (returned) then

@@ -77,13 +77,13 @@ contains
       call check_that(all(contact(:, 1) == [2, 0, 1, 1, 0]), 'the pressure decides, and a cell that slipped keeps its mark')
       rule = new_edge_rule(none, soft, reach/(soft*0.1_dp), 0.1_dp)
       call check_close(rule%share_length, reach, 1.0e-9_dp, 'length of a share')
-      call rule%decide(pressure, gap, share)
+      call rule%move(pressure, gap, .true., share)
       call check_that(all(nint(share(:, 1)) == [1, 0, 0, 1, 1]), 'the gap decides, too')
       call mark_shares(share, contact)
       call check_that(all(contact(:, 1) == [2, 0, 0, 1, 1]), 'cells with a share')
 
       share = 0.5_dp
-      call rule%move(pressure, gap, share)
+      call rule%move(pressure, gap, .false., share)
       expected = [1.0_dp, 0.0_dp, 0.0_dp, 0.5_dp + 0.4995_dp, 1.0_dp]
       call check_close(maxval(abs(share(:, 1) - expected)), 0.0_dp, 1.0e-9_dp, 'shares that have moved')
 

@@ -3,8 +3,7 @@ module test_friction_cg
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_convolution
-   use friction_cg, only : friction_fast, friction_fields_type, friction_gradient, &
-      friction_solver_type, friction_thesis, new_friction_solver
+   use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, &
       new_friction_law
    use asperity_threads, only : set_threads, thread_count
@@ -161,7 +160,7 @@ contains
             if (self%contact(i, j) == contact_open) cycle
             r = [self%drive_x(i, j) - ux(i, j), self%drive_y(i, j) - uy(i, j)]
             slope = 0.0_dp
-            if (self%law%slope) slope = [self%hx(i, j), self%hy(i, j)]
+            if (self%law%slope_effect) slope = [self%hx(i, j), self%hy(i, j)]
             d = [self%tx(i, j), self%ty(i, j)] - self%law%normal_traction(self%p(i, j), slope)
             s = self%law%bound_ratio(self%p(i, j), slope, d)
             if (s > 1.0_dp + 1e-8_dp) then
@@ -568,7 +567,7 @@ contains
    subroutine methods_agree()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :), ty(:, :)
-      integer, parameter :: methods(3) = [friction_fast, friction_thesis, friction_gradient]
+      character(*), parameter :: methods(3) = [character(8) :: 'fast', 'thesis', 'gradient']
       type(error_type), allocatable :: error
       real(dp) :: drive, bad
       integer :: k, l, boundary
@@ -583,7 +582,7 @@ contains
             self%drive_y = 0.5_dp*drive
             do k = 1, 3
                call self%solver%destroy()
-               call new_friction_solver(self%solver, self%grid, self%operator, error, methods(k))
+               call new_friction_solver(self%solver, self%grid, self%operator, error, trim(methods(k)))
                call check_no_error(error, 'method')
                self%solver%max_iterations = 5000
                self%solver%tolerance = 1e-8_dp
@@ -611,7 +610,7 @@ contains
    subroutine a_stop_ends_the_solve()
       type(case_type) :: self
       real(dp), allocatable :: tx(:, :)
-      integer, parameter :: methods(3) = [friction_fast, friction_thesis, friction_gradient]
+      character(*), parameter :: methods(3) = [character(8) :: 'fast', 'thesis', 'gradient']
       type(error_type), allocatable :: error
       integer :: k, most, pulled, part
 
@@ -621,7 +620,7 @@ contains
       self%drive_x = 0.1_dp*sum(self%p)/size(self%p)
       do k = 1, 3
          call self%solver%destroy()
-         call new_friction_solver(self%solver, self%grid, self%operator, error, methods(k))
+         call new_friction_solver(self%solver, self%grid, self%operator, error, trim(methods(k)))
          call check_no_error(error, 'method')
          self%solver%max_iterations = 5000
          do pulled = 0, 1

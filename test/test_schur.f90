@@ -1,6 +1,7 @@
 !> Tests of the preconditioner of the normal solver: against a dense matrix, and by the iterations that it
 !> saves.
 module test_schur
+   use, intrinsic :: iso_c_binding, only : c_loc
    use active_blocks, only : active_blocks_type, new_active_blocks
    use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
    use coarse_level, only : coarse_level_type, new_coarse_level
@@ -22,6 +23,7 @@ module test_schur
       type(coarse_level_type) :: coarse
       type(active_blocks_type) :: active
       type(schur_preconditioner_type) :: preconditioner
+      real(dp), allocatable :: memory(:, :)     !! of the image and the response
    end type setting_type
 
 contains
@@ -59,7 +61,7 @@ contains
    subroutine preconditioner_is_the_schur_complement(boundary, nx, ny, aspect)
       integer, intent(in) :: boundary, nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx
-      type(setting_type) :: s
+      type(setting_type), target :: s
       type(error_type), allocatable :: error
       real(dp), allocatable :: b(:, :), unit(:), r(:), z(:), exact(:), found(:)
       logical, allocatable :: inside(:)
@@ -71,7 +73,8 @@ contains
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
       call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, error, extends=.true.)
+      allocate (s%memory(nx, ny))
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error, extends=.true.)
       call check_no_error(error, 'a preconditioner')
       n = nx*ny
       allocate (b(n, n), unit(n), r(n), z(n))
@@ -133,7 +136,7 @@ contains
    subroutine waves_extend_the_residual_by_means(boundary, nx, ny, aspect)
       integer, intent(in) :: boundary, nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx
-      type(setting_type) :: s
+      type(setting_type), target :: s
       type(error_type), allocatable :: error
       real(dp), allocatable :: b(:, :), e(:, :), unit(:), r(:), z(:), exact(:)
       integer, allocatable :: block(:)
@@ -145,7 +148,8 @@ contains
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
       call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .false., 1)
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, error)
+      allocate (s%memory(nx, ny))
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
       call check_no_error(error, 'a preconditioner')
       n = nx*ny
       allocate (b(n, n), e(n, n), unit(n), r(n), z(n))

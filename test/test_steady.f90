@@ -14,7 +14,7 @@ module test_steady
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
    use solver_result, only : solver_result_type
    use steady_contact, only : explain, sliding_outcome_type, steady_contact_type
-   use steady_step, only : new_steady_step, steady_step_type
+   use steady_step, only : new_steady_step, steady_state_type, steady_step_type
    use asperity_surface, only : new_height
    use text_tools, only : exact_text, to_text
    implicit none
@@ -63,15 +63,15 @@ contains
       type(sliding_outcome_type) :: outcome
 
       call explain(contact, new_friction_law('constant_shear', 0.0_dp, 1e5_dp, 0.0_dp, .true., .true.), outcome)
-      call check_that(index(outcome%rubbing%reason, '''coulomb_orowan''') > 0, 'the advice is complete: '// &
-         trim(outcome%rubbing%reason))
+      call check_that(index(outcome%tangential%reason, '''coulomb_orowan''') > 0, 'the advice is complete: '// &
+         trim(outcome%tangential%reason))
 
       contact%pressure = reshape([1e5_dp], [1, 1])
       contact%slope_x = reshape([2.0_dp], [1, 1])
       contact%slope_y = reshape([0.0_dp], [1, 1])
       call explain(contact, new_friction_law('coulomb', 1.0_dp, 0.0_dp, 0.0_dp, .true., .true.), outcome)
-      call check_that(index(outcome%rubbing%reason, '1/coefficient') > 0, 'the reason is complete: '// &
-         trim(outcome%rubbing%reason))
+      call check_that(index(outcome%tangential%reason, '1/coefficient') > 0, 'the reason is complete: '// &
+         trim(outcome%tangential%reason))
    end subroutine reasons_are_complete
 
    !> Full contact with a wave: P = p + K^-1 H, so that friction is k^2 h^2 G''(k V)/(2 (1-nu) p).
@@ -401,14 +401,14 @@ contains
    !> coefficient every face steeper than 1/4 holds any force, and the contact cannot avoid all of them. (With a coefficient
    !> of 1.5 there is a solution.)
    subroutine best_state_is_kept()
-      type(solver_result_type) :: normal, rubbing
+      type(solver_result_type) :: normal, tangential
       real(dp) :: missed(2)
       integer :: k
 
       do k = 1, 2
-         call slide_uphill('law = ''coulomb'', coefficient = 4', 1, merge(100, 300, k == 1), normal, rubbing)
-         missed(k) = max(normal%residual, rubbing%residual)
-         call check_that(.not. (normal%converged .and. rubbing%converged), 'wedged road: no solution is reported')
+         call slide_uphill('law = ''coulomb'', coefficient = 4', 1, merge(100, 300, k == 1), normal, tangential)
+         missed(k) = max(normal%residual, tangential%residual)
+         call check_that(.not. (normal%converged .and. tangential%converged), 'wedged road: no solution is reported')
          call check_order(index(normal%reason, 'wedges'), '>', 0, &
             'wedged road: reason: '//trim(normal%reason))
       end do
@@ -419,13 +419,13 @@ contains
    !> Constant shear jumps at the edge of the contact, so that the rounds alternate. The closed form of the law, in which a
    !> cell may be partly sheared, is solved nevertheless, in few rounds.
    subroutine constant_shear_at_the_edge()
-      type(solver_result_type) :: normal, rubbing
+      type(solver_result_type) :: normal, tangential
 
-      call slide_uphill('law = ''constant_shear'', shear_strength = 3e5, slope_effect = F', 1, 150, normal, rubbing)
-      call check_that(normal%converged .and. rubbing%converged, 'edge: constant shear: '//trim(normal%reason))
+      call slide_uphill('law = ''constant_shear'', shear_strength = 3e5, slope_effect = F', 1, 150, normal, tangential)
+      call check_that(normal%converged .and. tangential%converged, 'edge: constant shear: '//trim(normal%reason))
       call slide_uphill('law = ''coulomb_orowan'', coefficient = 1, shear_strength = 3e5, slope_effect = F', &
-         1, 150, normal, rubbing)
-      call check_that(normal%converged .and. rubbing%converged, 'edge: a stress that grows with the pressure')
+         1, 150, normal, tangential)
+      call check_that(normal%converged .and. tangential%converged, 'edge: a stress that grows with the pressure')
    end subroutine constant_shear_at_the_edge
 
    !> Under a rubber whose modulus spans three decades the splitting is slow, and Newton's method finishes the contact
@@ -449,23 +449,24 @@ contains
    !> On a steep road some cells nearly stick, and the rounds converge slowly. All cells are then solved at once: from near
    !> the solution before many rounds are made, or from farther away along a path of solutions.
    subroutine stalled_rounds_are_solved_at_once()
-      type(solver_result_type) :: normal, rubbing
+      type(solver_result_type) :: normal, tangential
 
-      call slide_uphill('law = ''coulomb'', coefficient = 0.8', 1, 120, normal, rubbing)
-      call check_that(normal%converged .and. rubbing%converged, 'nearly sticking: '//trim(normal%reason))
-      call slide_uphill('law = ''coulomb'', coefficient = 1.5', 2, 310, normal, rubbing)
-      call check_that(normal%converged .and. rubbing%converged, 'along a path: '//trim(normal%reason))
-      call check_order(rubbing%iterations, '>=', 225, 'along a path: rounds')
+      call slide_uphill('law = ''coulomb'', coefficient = 0.8', 1, 120, normal, tangential)
+      call check_that(normal%converged .and. tangential%converged, 'nearly sticking: '//trim(normal%reason))
+      call slide_uphill('law = ''coulomb'', coefficient = 1.5', 2, 310, normal, tangential)
+      call check_that(normal%converged .and. tangential%converged, 'along a path: '//trim(normal%reason))
+      call check_order(tangential%iterations, '>=', 225, 'along a path: rounds')
    end subroutine stalled_rounds_are_solved_at_once
 
    !> Run a number of rounds with a friction law on a steep road.
-   subroutine slide_uphill(law, seed, rounds, normal, rubbing)
+   subroutine slide_uphill(law, seed, rounds, normal, tangential)
       character(*), intent(in) :: law                  !! as in the group of the input
       integer, intent(in) :: seed                      !! of the road
       integer, intent(in) :: rounds                    !! largest number
-      type(solver_result_type), intent(out) :: normal, rubbing
+      type(solver_result_type), intent(out) :: normal, tangential
       type(case_type) :: case
       type(steady_step_type) :: steady
+      type(steady_state_type) :: state
       type(error_type), allocatable :: error
       type(interpolation_type) :: road
       type(planned_row_type) :: plan
@@ -480,12 +481,12 @@ contains
       call check_no_error(error, 'uphill: input')
       call new_height(case%grid, case%surfaces, height, error)
       call new_interpolation(road, case%grid, height, 'cubic', error)
-      call new_steady_step(steady, case, 1e-3_dp, error)
+      call new_steady_step(steady, state, case, 1e-3_dp, error)
       call check_no_error(error, 'uphill: steady')
       plan%load = case%phases(1)%target
       plan%velocity(1) = case%phases(1)%velocity_x
-      call steady%begin_curve([0.0_dp, 0.0_dp])
-      call steady%solve(plan, road, normal, rubbing)
+      call state%begin_curve([0.0_dp, 0.0_dp])
+      call steady%solve(plan, road, state, normal, tangential)
       call steady%destroy()
    end subroutine slide_uphill
 
@@ -495,17 +496,18 @@ contains
       type(simulation_type), intent(in) :: sim
       real(dp), intent(in) :: dt                       !! time step of the scheme, s; 0 for the continuum
       type(steady_step_type), intent(out) :: steady
+      type(steady_state_type) :: state
       type(error_type), allocatable :: error
       type(interpolation_type) :: road
       type(planned_row_type) :: plan
-      type(solver_result_type) :: normal, rubbing
+      type(solver_result_type) :: normal, tangential
       real(dp), allocatable :: height(:, :)
       real(dp) :: base(2), place(2)
       integer :: k
 
       call new_height(case%grid, case%surfaces, height, error)
       call new_interpolation(road, case%grid, height, 'cubic', error)
-      call new_steady_step(steady, case, sim%rms_height, error)
+      call new_steady_step(steady, state, case, sim%rms_height, error)
       call check_no_error(error, 'long run: steady')
       steady%scheme_dt = dt
       plan%load = case%phases(1)%target
@@ -514,9 +516,9 @@ contains
       base = 0.0_dp
       ! The mean displacement of the contact hardly depends on the place, so that a few rounds move the road there.
       do k = 1, merge(4, 1, case%friction%law /= 'none')
-         call steady%begin_curve(base)
-         call steady%solve(plan, road, normal, rubbing)
-         call check_that(normal%converged .and. rubbing%converged, 'long run: steady converged')
+         call state%begin_curve(base)
+         call steady%solve(plan, road, state, normal, tangential)
+         call check_that(normal%converged .and. tangential%converged, 'long run: steady converged')
          base = base + place - steady%place
       end do
    end subroutine find_steady

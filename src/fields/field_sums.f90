@@ -17,8 +17,8 @@ module field_sums
    private
 
    public :: added, cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
-      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, row_form, row_product, row_total, &
-      row_totals, sum_rows, threads_for, vector_sum
+      field_product, field_rms, field_sum, largest_of_rows, least_of_rows, ratio_of_lengths, row_form, row_product, &
+      row_total, row_totals, sum_rows, threads_for, vector_sum
 
    integer, parameter :: small = 16384          !! cells below which one thread is faster
 
@@ -115,6 +115,16 @@ contains
          totals = added(rows)
       end if
    end function row_totals
+
+   !> The length of one field over that of another, from the squares of both in each row.
+   function ratio_of_lengths(rows) result(ratio)
+      real(dp), intent(in) :: rows(:, :)       !! [2, rows of this process]
+      real(dp) :: ratio
+      real(dp) :: sums(2)
+
+      sums = row_totals(rows)
+      ratio = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
+   end function ratio_of_lengths
 
    !> Totals of several sums per row, and the largest of one more number per row, in one exchange.
    subroutine sum_rows(rows, totals, largest)

@@ -45,7 +45,7 @@ module friction_law
    type :: friction_law_type
       class(shear_law_type), allocatable :: shear     !! the bound under a pressure
       real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = e'(0), Pa; 0 without adhesion
-      logical :: slope = .false.                 !! the slope of the road counts
+      logical :: slope_effect = .false.          !! the slope of the road counts
       logical :: physical_slip = .true.          !! direction of slip: physical, or that of the thesis
    contains
       procedure :: normal_traction
@@ -76,7 +76,7 @@ contains
 
       call choose_shear_law(name, coefficient, shear_strength, self%shear, table)
       self%adhesive_pressure = adhesive_pressure
-      self%slope = slope
+      self%slope_effect = slope
       self%physical_slip = physical_slip
    end function new_friction_law
 
@@ -87,7 +87,7 @@ contains
       real(dp), intent(in) :: slope(2)      !! H_x, H_y; not used by a law without slope
       real(dp) :: t(2)                      !! Pa
 
-      if (self%slope) then
+      if (self%slope_effect) then
          t = -p*slope
       else
          t = 0.0_dp
@@ -106,7 +106,7 @@ contains
 
       part = 1.0_dp
       if (present(share)) part = share
-      if (self%slope) then
+      if (self%slope_effect) then
          root = sqrt(1.0_dp + slope(1)**2 + slope(2)**2)       ! 1/N_z
          nd = -(slope(1)*d(1) + slope(2)*d(2))/root
          m = sqrt(max(d(1)**2 + d(2)**2 - nd**2, 0.0_dp))
@@ -206,7 +206,7 @@ contains
 
       n = 0.0_dp
       nz = 1.0_dp
-      if (self%slope) then
+      if (self%slope_effect) then
          nz = 1.0_dp/sqrt(1.0_dp + slope(1)**2 + slope(2)**2)
          n = -nz*slope
       end if
@@ -240,7 +240,7 @@ contains
       real(dp), intent(in), optional :: share(2)     !! of the bound, see module `shear_law`; 1 if absent
       real(dp) :: d(2)
 
-      if (self%slope) then
+      if (self%slope_effect) then
          d(1) = t(1) + p*slope(1)
          d(2) = t(2) + p*slope(2)
          s = bound_ratio(self, p, slope, d, share)
@@ -265,7 +265,7 @@ contains
       real(dp) :: slip(2)
 
       slip = r
-      if (self%slope .and. self%physical_slip) then
+      if (self%slope_effect .and. self%physical_slip) then
          slip = r + slope*(slope(1)*r(1) + slope(2)*r(2))
       end if
    end function slip_along_slope

@@ -20,7 +20,6 @@ module asperity_simulation
    use contact_model, only : commit_step, contact_type, new_contact, place_road, solve_normal
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
-   use finite_fields, only : reason_overflow
    use history_table, only : row_values
    use pulled_road, only : guess_road, pull_outcome, place_pulled_road, watch_motion
    use rising_clock, only : seconds_now
@@ -87,16 +86,12 @@ contains
       self%slides = road_moves(case%phases)
       if (present(movable)) self%slides = self%slides .or. movable
       call new_height(self%grid, case%surfaces, self%height, error, self%map_checksums)
-      if (allocated(error)) return
-      call new_contact(self, error)
+      if (.not. allocated(error)) call new_contact(self, error)
       if (allocated(error)) return
       if (self%frictional) call new_coupled_passes(self%passes, self%grid, sharing=self%tangential%law%jumps_at_edge())
       self%has_steady = self%slides .and. any(case%phases%steady)
-      if (.not. self%has_steady) return
-      call new_steady_step(self%steady, case, self%rms_height, error)
-      if (allocated(error)) return
-      call self%state%steady%last%copy(self%steady%last)
-      call self%state%steady%before%copy(self%steady%before)
+      if (self%has_steady) &
+         call new_steady_step(self%steady, self%state%steady, case, self%rms_height, error)
    end subroutine new_simulation
 
    !> Find the state after the next row, without changing the present one. If the solvers do not converge, the
@@ -246,7 +241,7 @@ contains
       real(dp) :: road(2), motion(2)
       character(:), allocatable :: message
 
-      found%rubbing%converged = .true.
+      found%tangential%converged = .true.
       if (plan%steady) then
          call solve_steady_row(self, self%steady, plan, found)
          self%stop%given_up = found%normal%stopped
@@ -261,7 +256,7 @@ contains
             plan%dt, plan%pulled, plan%pull)
          call move_road(self, plan)
          if (self%rubs()) then
-            call self%passes%solve(self, plan, motion, found%normal, found%rubbing)
+            call self%passes%solve(self, plan, motion, found%normal, found%tangential)
             if (self%stop%given_up) return
             found%passes = self%passes%passes
             found%mismatch = self%passes%mismatch
@@ -284,13 +279,13 @@ contains
       type(planned_row_type), intent(in) :: plan
       type(found_step_type), intent(in) :: found
 
-      self%converged = found%normal%converged .and. found%rubbing%converged
-      if (found%normal%converged .and. .not. found%rubbing%converged) then
-         call note_outcome(self, found%rubbing)
-         self%reason = 'friction: '//trim(found%rubbing%reason)
-         if (self%tangential%road%slides_off) then
+      self%converged = found%normal%converged .and. found%tangential%converged
+      if (found%normal%converged .and. .not. found%tangential%converged) then
+         call note_outcome(self, found%tangential)
+         self%reason = 'friction: '//trim(found%tangential%reason)
+         if (self%tangential%road_pull%slides_off) then
             self%reason = pull_outcome(plan, self%tangential)
-            self%residual = found%rubbing%load_error
+            self%residual = found%tangential%load_error
          end if
       else
          call note_outcome(self, found%normal)
@@ -356,14 +351,14 @@ contains
 
       if (all(ieee_is_finite(row_values(self%state%row)))) return
       self%converged = .false.
-      self%reason = reason_overflow
+      self%reason = 'a value is not a finite number'
    end subroutine check_finite
 
    !> Free plans and fields.
    subroutine destroy(self)
       class(simulation_type), intent(inout) :: self
 
-      call self%side%destroy()
+      call self%normal%destroy()
       call self%work%destroy()
       if (allocated(self%state)) deallocate (self%state)
       if (allocated(self%proposed)) deallocate (self%proposed)

@@ -6,7 +6,6 @@
 !> Several processes do the same work, each on its rows of the fields. Module `run_files` handles the files. Only
 !> the first process opens them, and a fault on one process ends all of them with the same message.
 module case_run
-   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use asperity_errors, only : error_convergence, error_type, fail
    use asperity_parallel, only : global_max, processes_of_machine, share
    use asperity_precision, only : dp
@@ -15,7 +14,6 @@ module case_run
    use asperity_threads, only : set_threads
    use case_memory, only : memory_needed
    use case_settings, only : case_type
-   use history_table, only : row_values
    use memory_limits, only : need_memory
    use process_agreement, only : agree
    use regular_grid, only : grid_type
@@ -64,8 +62,7 @@ contains
       self%saved_at = seconds_now()
       call self%files%lock_place(trim(case%output%file), restart, overwrite, error)
       call check_memory(case, error)
-      if (allocated(error)) return
-      call new_simulation(self%sim, case, error)
+      if (.not. allocated(error)) call new_simulation(self%sim, case, error)
       call agree(error)
       if (allocated(error)) return
       if (restart) then
@@ -115,10 +112,6 @@ contains
       call self%sim%advance(error)
       call agree(error)
       if (allocated(error) .or. self%sim%stop%given_up) return
-      if (.not. all(ieee_is_finite(row_values(self%sim%state%row)))) then
-         self%sim%converged = .false.
-         self%sim%reason = 'a value is not a finite number'
-      end if
       self%finished = self%sim%finished
       call collect_warnings(self)
       call self%files%write_row(self%sim, error)

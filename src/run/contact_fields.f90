@@ -4,6 +4,7 @@ module contact_fields
    use asperity_precision, only : dp, int8
    use contact_model, only : contact_type
    use contact_rule, only : touches
+   use friction_law, only : contact_open, contact_slip, contact_stick
    implicit none
    private
 
@@ -55,15 +56,15 @@ contains
       integer(int8) :: touching
       integer :: j, k
 
-      touching = 2_int8
-      if (self%holds()) touching = 1_int8
+      touching = contact_slip
+      if (self%holds()) touching = contact_stick
       do k = 1, size(states, 2)
          j = first + k - 1
          if (self%rubs()) then
             states(:, k) = self%state%tangential%contact(:, j)
          else
-            states(:, k) = merge(touching, 0_int8, &
-               touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j)))
+            states(:, k) = merge(touching, contact_open, &
+               touches(self%normal%adhesive, self%state%pressure(:, j), self%state%gap(:, j)))
          end if
       end do
    end subroutine contact_rows

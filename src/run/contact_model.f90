@@ -40,7 +40,7 @@ module contact_model
       type(state_type), allocatable :: state        !! state after the last row
       type(case_type) :: case
       type(grid_type) :: grid
-      type(normal_step_type) :: side                !! the solvers of the normal contact
+      type(normal_step_type) :: normal              !! the solvers of the normal contact
       type(tangential_step_type) :: tangential      !! the solver of friction, and its present step
       type(zener_type) :: material                  !! with the coefficients of the present step
       type(interpolation_type) :: road              !! the original map
@@ -77,34 +77,29 @@ contains
       associate (case => self%case)
          edge = 0.0_dp
          if (case%adhesion%potential /= 'none') edge = adhesion_edge(case)
-         call new_normal_step(self%side, self%grid, normal_kernel(case%material), case%solver, &
-            case%adhesion, edge, self%height, error)
-         call agree(error)
-         if (allocated(error)) return
          call new_zener(self%material, case%material%shear_modulus, case%material%prony_g, &
             case%material%prony_tau, trim(case%solver%time_scheme), error)
-         if (allocated(error)) return
+         if (.not. allocated(error)) call new_normal_step(self%normal, self%grid, normal_kernel(case%material), &
+            case%solver, case%adhesion, edge, self%height, error)
       end associate
-      self%summit = self%side%summit
-      self%rms_height = self%side%rms_height
-      call new_arm_state(self%state%arms, self%material, nx, ny, 1, error)
       call agree(error)
       if (allocated(error)) return
+      self%summit = self%normal%summit
+      self%rms_height = self%normal%rms_height
       call new_books(self%state%books, self%material, self%grid%cell_area())
       allocate (self%state%pressure(nx, ny), self%state%gap(nx, ny), source=0.0_dp)
       ! The displacement is only needed by a later row: that of the last row can be computed from the gap.
       if (self%slides .or. count_rows(self%case%phases) > 1) &
          allocate (self%state%displacement(nx, ny), source=0.0_dp)
       if (.not. is_elastic(self%material)) allocate (self%past(nx, ny), source=0.0_dp)
-      if (self%slides) call new_road(self, error)
+      call new_arm_state(self%state%arms, self%material, nx, ny, 1, error)
+      if (self%slides .and. .not. allocated(error)) call new_road(self, error)
       call agree(error)
       if (allocated(error)) return
       self%frictional = self%slides .and. self%case%friction%law /= 'none'
       if (.not. self%frictional) return
       call new_tangential_state(self%state%tangential, self%case, self%grid, self%material, error)
-      call agree(error)
-      if (allocated(error)) return
-      call new_tangential_step(self%tangential, self%case, self%grid, error)
+      if (.not. allocated(error)) call new_tangential_step(self%tangential, self%case, self%grid, error)
       call agree(error)
    end subroutine new_contact
 
@@ -160,9 +155,9 @@ contains
 
       task = normal_task_type(plan%control, plan%load, self%material%q, self%state%first)
       if (present(displaced)) task%displaced = displaced
-      self%side%tolerance = tolerance
+      self%normal%tolerance = tolerance
       ! Without arms `past` is not allocated, and therefore an absent argument.
-      call self%side%solve(task, self%height, self%state%pressure, self%state%gap, self%state%level, &
+      call self%normal%solve(task, self%height, self%state%pressure, self%state%gap, self%state%level, &
          outcome, self%past)
       self%state%first = .false.
    end subroutine solve_normal
@@ -206,7 +201,7 @@ contains
       allocate (rows(3, self%grid%rows()))
       !$omp parallel do default(none) shared(self, field, rows) private(j, touching)
       do j = 1, self%grid%rows()
-         touching = touches(self%side%adhesive, self%state%pressure(:, j), self%state%gap(:, j))
+         touching = touches(self%normal%adhesive, self%state%pressure(:, j), self%state%gap(:, j))
          rows(1, j) = sum(field(:, 1, j), touching)
          rows(2, j) = sum(field(:, 2, j), touching)
          rows(3, j) = count(touching)

@@ -124,17 +124,17 @@ contains
    end subroutine new_coupled_passes
 
    !> Solve a row. The caller has moved the road and begun the tangential step.
-   subroutine solve(self, contact, plan, motion, normal, rubbing)
+   subroutine solve(self, contact, plan, motion, normal, tangential)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: motion(2)                  !! of the road in this row, m
-      type(solver_result_type), intent(out) :: normal    !! all normal solves
-      type(solver_result_type), intent(out) :: rubbing   !! all tangential solves
+      type(solver_result_type), intent(out) :: normal      !! all normal solves
+      type(solver_result_type), intent(out) :: tangential  !! all tangential solves
       type(pass_control_type) :: control
       real(dp) :: tolerance
       integer :: most
-      logical :: tried                                   !! the step was solved jointly, or the attempt failed
+      logical :: overwritten                             !! an attempt to solve the step jointly has replaced its fields
 
       tolerance = contact%case%solver%tolerance
       most = contact%case%solver%passes
@@ -144,8 +144,8 @@ contains
          self%passes = self%passes + 1
          ! Early passes are solved coarsely; the result that the row keeps is solved to the tolerance.
          if (self%passes == most) control%accuracy = min(control%accuracy, tolerance)
-         call do_pass(self, contact, plan, control%accuracy, normal, rubbing)
-         contact%stop%given_up = normal%stopped .or. rubbing%stopped
+         call do_pass(self, contact, plan, control%accuracy, normal, tangential)
+         contact%stop%given_up = normal%stopped .or. tangential%stopped
          if (contact%stop%given_up) return
          if (self%passes == 1 .and. .not. plan%instantaneous) contact%state%first_mismatch = self%mismatch
          if (self%passes == most .or. .not. normal%converged) exit
@@ -160,8 +160,8 @@ contains
          if (control%joint_due) then
             ! The next pass is done at the joint solution. If there is none, the attempt has overwritten the result of
             ! the last pass, which is therefore repeated.
-            call solve_jointly(self, contact, plan, control, rubbing, tried)
-            if (tried) cycle
+            call solve_jointly(self, contact, plan, control, tangential, overwritten)
+            if (overwritten) cycle
          end if
          call choose_place(self, contact, control)
          ! The last of many passes is done at the best place that was found.
@@ -203,20 +203,20 @@ contains
 
    !> Solve the step all at once, because the passes have stalled. If that succeeds, the next pass starts from its
    !> solution with accurate solves, and verifies that the step is solved. Otherwise the place stays as it is.
-   subroutine solve_jointly(self, contact, plan, control, rubbing, tried)
+   subroutine solve_jointly(self, contact, plan, control, tangential, overwritten)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       type(pass_control_type), intent(inout) :: control
-      type(solver_result_type), intent(inout) :: rubbing   !! all tangential solves; its transforms are added
-      logical, intent(out) :: tried                        !! the trial fields have been overwritten
+      type(solver_result_type), intent(inout) :: tangential   !! all tangential solves; its transforms are added
+      logical, intent(out) :: overwritten                        !! the result of the last pass has been overwritten
       logical :: solved
       integer :: transforms
 
       call self%joint%solve(contact, plan, solved, transforms)
       self%gap_known = .false.
-      rubbing%ffts = rubbing%ffts + transforms
-      tried = transforms > 0
+      tangential%ffts = tangential%ffts + transforms
+      overwritten = transforms > 0
       if (.not. solved) return
       self%place(:, :2, :) = contact%tangential%trial
       if (self%sharing) self%place(:, 3, :) = self%edge%share_length*contact%tangential%share
@@ -224,12 +224,12 @@ contains
    end subroutine solve_jointly
 
    !> Do one pass at the place, and compute the mismatch that it leaves.
-   subroutine do_pass(self, contact, plan, accuracy, normal, rubbing)
+   subroutine do_pass(self, contact, plan, accuracy, normal, tangential)
       class(coupled_passes_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: accuracy                   !! of both solves
-      type(solver_result_type), intent(inout) :: normal, rubbing
+      type(solver_result_type), intent(inout) :: normal, tangential
       type(solver_result_type) :: part
       integer :: j
 
@@ -246,7 +246,7 @@ contains
       call solve_normal(contact, plan, accuracy, part, displaced=self%gap_known)
       ! A pressure that misses the load is scaled to it at the start of the next solve, and U_z would no longer
       ! belong to it.
-      self%gap_known = .not. contact%side%adhesive .and. part%load_error <= exact_load
+      self%gap_known = .not. contact%normal%adhesive .and. part%load_error <= exact_load
       normal%stopped = part%stopped
       if (normal%stopped) return
       call add_result(normal, part)
@@ -254,8 +254,8 @@ contains
       contact%tangential%tolerance = accuracy
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
-      call add_result(rubbing, part)
-      if (rubbing%stopped) return
+      call add_result(tangential, part)
+      if (tangential%stopped) return
       self%mismatch = mismatch_of(contact, plan, self%sharing, self%edge)
    end subroutine do_pass
 
@@ -267,11 +267,8 @@ contains
       if (.not. allocated(contact%tangential%share)) &
          allocate (contact%tangential%share(size(self%place, 1), size(self%place, 3)))
       contact%tangential%share(:, :) = self%place(:, 3, :)/self%edge%share_length
-      if (self%passes <= deciding_passes) then
-         call self%edge%decide(contact%state%pressure, contact%state%gap, contact%tangential%share)
-      else
-         call self%edge%move(contact%state%pressure, contact%state%gap, contact%tangential%share)
-      end if
+      call self%edge%move(contact%state%pressure, contact%state%gap, self%passes <= deciding_passes, &
+         contact%tangential%share)
       self%place_residual(:, 3, :) = self%edge%share_length*contact%tangential%share - self%place(:, 3, :)
    end subroutine update_shares
 
@@ -297,7 +294,7 @@ contains
          call forecast%add(self%place(:, :2, :))
       end associate
       if (.not. self%sharing) return
-      self%edge = new_edge_rule(contact%side%potential, contact%tangential%cell_compliance(), &
+      self%edge = new_edge_rule(contact%normal%potential, contact%tangential%cell_compliance(), &
          contact%tangential%law%bare_strength(), contact%rms_slope)
       self%place(:, 3, :) = merge(self%edge%share_length, 0.0_dp, contact%state%tangential%contact /= contact_open)
    end subroutine predict

@@ -49,7 +49,7 @@ contains
 
       part = 0.0_dp
       mu = self%tangential%law%reach_coefficient()
-      if (.not. self%tangential%law%slope) return
+      if (.not. self%tangential%law%slope_effect) return
       allocate (rows(2, self%grid%rows()))
       do j = 1, self%grid%rows()
          rows(1, j) = sum(abs(self%state%pressure(:, j)))

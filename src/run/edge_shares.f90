@@ -29,7 +29,6 @@ module edge_shares
       real(dp) :: soft = 0.0_dp                        !! displacement of a cell under its own unit traction, m/Pa
       real(dp) :: share_length = 0.0_dp                !! by which the whole strength moves a cell down the slopes, m
    contains
-      procedure :: decide
       procedure :: move
       procedure :: error
    end type edge_rule_type
@@ -59,36 +58,26 @@ contains
       wall = pressure + adhesive_slope(self%potential, max(gap, 0.0_dp))
    end function wall_pressure
 
-   !> Set each share to 0 or 1, from pressure and gap alone. The larger of the gap and of the length by which the
-   !> pressure presses the cell in decides, because the normal solver leaves small pressures, of round-off or of its
-   !> tolerance, in cells with a gap.
-   subroutine decide(self, pressure, gap, share)
+   !> Change the shares by the rule, with the pressure and the gap of a pass. With `decide` each share becomes 0 or 1:
+   !> the larger of the gap and of the length by which the pressure presses the cell in decides, because the normal
+   !> solver leaves small pressures, of round-off or of its tolerance, in cells with a gap.
+   subroutine move(self, pressure, gap, decide, share)
       class(edge_rule_type), intent(in) :: self
       real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
       real(dp), intent(in) :: gap(:, :)                !! m
+      logical, intent(in) :: decide
       real(dp), intent(inout) :: share(:, :)
+      real(dp) :: pressed(size(share, 1))              !! lengths by which the pressures press the cells in, m
       integer :: j
 
-      !$omp parallel do default(none) shared(self, pressure, gap, share) private(j)
+      !$omp parallel do default(none) shared(self, pressure, gap, decide, share) private(j, pressed)
       do j = 1, size(share, 2)
-         share(:, j) = merge(1.0_dp, 0.0_dp, &
-            self%soft*wall_pressure(self, pressure(:, j), gap(:, j)) > gap(:, j))
-      end do
-   end subroutine decide
-
-   !> Change the shares by the rule, with the pressure and the gap of a pass.
-   subroutine move(self, pressure, gap, share)
-      class(edge_rule_type), intent(in) :: self
-      real(dp), intent(in) :: pressure(:, :)           !! attraction included, Pa
-      real(dp), intent(in) :: gap(:, :)                !! m
-      real(dp), intent(inout) :: share(:, :)
-      integer :: j
-
-      !$omp parallel do default(none) shared(self, pressure, gap, share) private(j)
-      do j = 1, size(share, 2)
-         share(:, j) = share(:, j) &
-            + (self%soft*wall_pressure(self, pressure(:, j), gap(:, j)) - gap(:, j))/self%share_length
-         share(:, j) = min(max(share(:, j), 0.0_dp), 1.0_dp)
+         pressed = self%soft*wall_pressure(self, pressure(:, j), gap(:, j))
+         if (decide) then
+            share(:, j) = merge(1.0_dp, 0.0_dp, pressed > gap(:, j))
+         else
+            share(:, j) = min(max(share(:, j) + (pressed - gap(:, j))/self%share_length, 0.0_dp), 1.0_dp)
+         end if
       end do
    end subroutine move
 

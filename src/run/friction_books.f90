@@ -3,9 +3,9 @@
 !> The loss of a cell is the mean traction over the step times the slip, which is of second order in the length of
 !> the step.
 module friction_books
-   use asperity_precision, only : dp, int8
+   use asperity_precision, only : dp
    use field_sums, only : row_totals
-   use friction_law, only : friction_law_type
+   use friction_law, only : contact_open, contact_stick, friction_law_type
    use tangential_state, only : tangential_state_type
    implicit none
    private
@@ -15,7 +15,7 @@ module friction_books
    !> Sums over the cells.
    type :: rubbed_type
       real(dp) :: loss = 0.0_dp                       !! J/m2
-      real(dp) :: motion(2) = 0.0_dp                     !! motion of the surface in the contact, m
+      real(dp) :: motion(2) = 0.0_dp                 !! motion of the surface in the contact, m
       real(dp) :: cells = 0.0_dp                      !! number of cells in contact
    end type rubbed_type
 
@@ -41,15 +41,15 @@ contains
       do j = 1, size(pressure, 2)
          do i = 1, size(pressure, 1)
             rubbing = 0.0_dp
-            if (state%contact(i, j) /= 0_int8) then
-               if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+            if (state%contact(i, j) /= contact_open) then
+               if (law%slope_effect) slope = [slope_x(i, j), slope_y(i, j)]
                rubbing = state%traction(i, :, j) - law%normal_traction(pressure(i, j), slope)
                rows(2:3, j) = rows(2:3, j) + trial(i, :, j) - state%displacement(i, :, j)
                rows(4, j) = rows(4, j) + 1.0_dp
             end if
             ! The slip of a point that sticks is an error within the tolerance of the solver, and causes no loss.
-            if (state%contact(i, j) /= 1_int8) rows(1, j) = rows(1, j) &
-               + friction_loss(state%rubbed(i, j) == 1_int8, state%rubbing(i, :, j), rubbing, slip(i, :, j))
+            if (state%contact(i, j) /= contact_stick) rows(1, j) = rows(1, j) + friction_loss( &
+               state%rubbed(i, j) == contact_stick, state%rubbing(i, :, j), rubbing, slip(i, :, j))
             state%rubbing(i, :, j) = rubbing
             state%rubbed(i, j) = state%contact(i, j)
          end do

@@ -14,11 +14,11 @@ module joint_equations
    use asperity_errors, only : error_type
    use asperity_interpolation, only : displaced
    use asperity_parallel, only : any_process
-   use asperity_precision, only : dp, int8
+   use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
    use fft_conv, only : columns_apply, convolution_type, new_convolution
-   use field_sums, only : largest_of_rows, row_totals
+   use friction_law, only : contact_open, contact_slip, contact_stick
    use joint_system, only : joint_state_type, joint_system_type
    use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : normal_kernel
@@ -72,14 +72,12 @@ contains
       if (.not. self%ready) call destroy(self)
    end subroutine prepare
 
-   !> Set the units, and make the first state from that of the contact.
+   !> Set the rules and the units, and make the first state from that of the contact.
    subroutine start(self, contact, plan, begun)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout), target :: contact      !! until the step is solved
       type(planned_row_type), intent(in) :: plan
       type(joint_state_type), intent(inout) :: begun
-      logical, allocatable :: touching(:, :)
-      integer :: c
 
       self%contact => contact
       self%plan = plan
@@ -87,19 +85,14 @@ contains
       self%evaluations = 0
       self%most_evaluations = most_evaluations
       associate (rules => self%rules, state => contact%state)
-         rules%potential = contact%side%potential
+         rules%potential = contact%normal%potential
          rules%law = contact%tangential%law
          rules%attraction = 0.0_dp
-         if (contact%side%adhesive) rules%attraction = adhesive_slope(rules%potential, 0.0_dp)
+         if (contact%normal%adhesive) rules%attraction = adhesive_slope(rules%potential, 0.0_dp)
          rules%soft = self%compliance/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
-         touching = state%tangential%contact /= 0_int8
-         call self%choose_units(touching, state%pressure, contact%rms_slope)
-         self%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
-         begun%s(:, :) = rules%number_of(self%width, touching, state%pressure, state%gap)
-         do c = 1, 2
-            begun%t(:, c, :) = merge(state%tangential%traction(:, c, :), 0.0_dp, touching)
-         end do
+         call self%begin(state%tangential%contact /= contact_open, state%pressure, state%gap, &
+            state%tangential%traction, contact%slope_x, contact%slope_y, contact%rms_slope, begun)
          begun%level = state%level
       end associate
    end subroutine start
@@ -108,53 +101,28 @@ contains
    subroutine evaluate(self, state)
       class(joint_equations_type), intent(inout) :: self
       type(joint_state_type), intent(inout) :: state
-
-      call evaluate_step(self, self%contact, self%plan, state)
-   end subroutine evaluate
-
-   !> Do the same with the contact and the row as arguments.
-   subroutine evaluate_step(self, contact, plan, state)
-      class(joint_equations_type), intent(inout) :: self
-      class(contact_type), intent(inout) :: contact
-      type(planned_row_type), intent(in) :: plan
-      type(joint_state_type), intent(inout) :: state
-      real(dp), allocatable :: rows(:, :), largest(:)
-      real(dp) :: sums(2)
       integer :: j
 
       self%evaluations = self%evaluations + 1
-      call form_pressure(self, contact, state%s)
-      call contact%tangential%try(contact%state%tangential, state%t)
-      call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
-         contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
-      allocate (rows(2, contact%grid%rows()), largest(contact%grid%rows()))
-      !$omp parallel do default(none) shared(self, contact, state, rows, largest) private(j) &
-      !$omp num_threads(self%operator%threads)
-      do j = 1, contact%grid%rows()
-         call evaluate_row(self, contact, state, j)
-         rows(:, j) = [sum(state%residual(:, :, j)**2), sum(self%pressure(:, j))]
-         largest(j) = maxval(abs(state%residual(:, :, j)))
-      end do
-      sums = row_totals(rows)
-      if (plan%control == 'displacement') then
-         state%load_residual = (state%level - (plan%load - contact%summit))/self%unit_length
-      else
-         state%load_residual = (sums(2)/contact%grid%cells() - wanted_mean(contact, plan))/self%unit_pressure
-      end if
-      state%worst = max(largest_of_rows(largest), abs(state%load_residual))
-      state%load_residual = state%load_residual*self%root
-      state%merit = sqrt(sums(1) + state%load_residual**2)
-   end subroutine evaluate_step
-
-   !> The mean pressure that is prescribed, Pa.
-   pure function wanted_mean(contact, plan) result(mean)
-      class(contact_type), intent(in) :: contact
-      type(planned_row_type), intent(in) :: plan
-      real(dp) :: mean
-
-      mean = plan%load
-      if (plan%control == 'force') mean = plan%load/contact%grid%area()
-   end function wanted_mean
+      associate (contact => self%contact, plan => self%plan)
+         call form_pressure(self, contact, state%s)
+         call contact%tangential%try(contact%state%tangential, state%t)
+         call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
+            contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
+         !$omp parallel do default(none) shared(self, state) private(j) num_threads(self%operator%threads)
+         do j = 1, self%grid%rows()
+            call evaluate_row(self, self%contact, state, j)
+         end do
+         select case (plan%control)
+         case ('displacement')
+            call self%sum_residuals(state, self%pressure, 0.0_dp, level=plan%load - contact%summit)
+         case ('force')
+            call self%sum_residuals(state, self%pressure, plan%load/contact%grid%area())
+         case default
+            call self%sum_residuals(state, self%pressure, plan%load)
+         end select
+      end associate
+   end subroutine evaluate
 
    !> Compute P of a state, and the transforms of its displacement.
    subroutine form_pressure(self, contact, s)
@@ -181,18 +149,13 @@ contains
       class(contact_type), intent(in) :: contact
       type(joint_state_type), intent(inout) :: state
       integer, intent(in) :: j
-      real(dp) :: u(size(state%s, 1)), share(size(state%s, 1)), slope(2)
+      real(dp) :: u(size(state%s, 1))
       integer :: i
 
       call self%operator%backward_row(1, j, u)
-      state%residual(:, 1, j) = (u/contact%material%q - self%height(:, j) - state%level &
-         - self%rules%gap_of(state%s(:, j)))/self%unit_length
-      share = self%rules%share_of(self%width(:, j), state%s(:, j))
-      slope = 0.0_dp
       do i = 1, size(u)
-         if (self%rules%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
-         state%residual(i, 2:3, j) = self%rules%traction_error(share(i), self%pressure(i, j), slope, &
-            contact%tangential%slip(i, :, j), state%t(i, :, j))/self%unit_traction
+         call self%cell_residual(state, i, j, u(i)/contact%material%q - self%height(i, j), self%pressure(i, j), &
+            [self%slope_x(i, j), self%slope_y(i, j)], contact%tangential%slip(i, :, j))
       end do
    end subroutine evaluate_row
 
@@ -215,17 +178,17 @@ contains
       end if
       call evaluate(self, found)
       slope = 0.0_dp
-      associate (state => contact%state, rubbing => contact%state%tangential)
+      associate (state => contact%state, tangential => contact%state%tangential)
          state%pressure(:, :) = self%pressure
          state%gap(:, :) = self%rules%gap_of(found%s)
          state%level = found%level
-         rubbing%traction(:, :, :) = found%t
+         tangential%traction(:, :, :) = found%t
          contact%tangential%share(:, :) = self%rules%share_of(self%width, found%s)
          do j = 1, contact%grid%rows()
             do i = 1, contact%grid%nx
-               if (self%rules%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
-               rubbing%contact(i, j) = 0_int8
-               if (contact%tangential%share(i, j) > 0.0_dp) rubbing%contact(i, j) = merge(2_int8, 1_int8, &
+               if (self%rules%law%slope_effect) slope = [self%slope_x(i, j), self%slope_y(i, j)]
+               tangential%contact(i, j) = contact_open
+               if (contact%tangential%share(i, j) > 0.0_dp) tangential%contact(i, j) = merge(contact_slip, contact_stick, &
                   self%rules%slips(contact%tangential%share(i, j), self%pressure(i, j), slope, found%t(i, :, j)))
             end do
          end do

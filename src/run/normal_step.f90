@@ -42,7 +42,7 @@ module normal_step
       logical :: adhesive = .false.
       real(dp) :: summit = 0.0_dp                  !! highest point of the original map, m
       real(dp) :: rms_height = 0.0_dp              !! of the original map about its mean, m
-      class(contact_solver_type), allocatable :: normal
+      class(contact_solver_type), allocatable, private :: plain   !! solves the contact without adhesion
       type(adhesion_potential_type) :: potential
       type(adhesion_solver_type), private :: adhesion
       logical, private :: full_contact = .false.
@@ -74,7 +74,7 @@ contains
       self%max_iterations = solver%max_iterations
       self%adhesive = adhesion%potential /= 'none'
       self%summit = field_maximum(height)
-      call new_contact_solver(self%normal, trim(solver%method), self%grid, kernel, error, &
+      call new_contact_solver(self%plain, trim(solver%method), self%grid, kernel, error, &
          mixed=solver%precision == 'mixed')
       if (allocated(error)) return
       self%rms_height = field_rms(height, field_mean(height))
@@ -205,7 +205,7 @@ contains
       problem%warm = .not. task%first
       problem%displaced = task%displaced
       call load_of(self, task, problem%control, problem%target)
-      call self%normal%solve(problem, height, pressure, gap, level, outcome, past)
+      call self%plain%solve(problem, height, pressure, gap, level, outcome, past)
    end subroutine solve_without_adhesion
 
    !> Energy of adhesion of a gap over the whole cell, J.
@@ -230,7 +230,7 @@ contains
    subroutine destroy(self)
       class(normal_step_type), intent(inout) :: self
 
-      if (allocated(self%normal)) call self%normal%destroy()
+      if (allocated(self%plain)) call self%plain%destroy()
       if (self%adhesive) call self%adhesion%destroy()
    end subroutine destroy
 

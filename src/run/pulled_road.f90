@@ -93,7 +93,7 @@ contains
       type(tangential_step_type), intent(in) :: tangential
       character(:), allocatable :: reason
 
-      associate (pull => norm2(merge(plan%pull, 0.0_dp, plan%pulled)), held => norm2(tangential%road%held))
+      associate (pull => norm2(merge(plan%pull, 0.0_dp, plan%pulled)), held => norm2(tangential%road_pull%held))
          reason = 'the road is pulled by '//to_text(pull)//' Pa over the cell, and '
          if (held < pull) then
             reason = reason//'the friction holds at most '//to_text(held)//' Pa'

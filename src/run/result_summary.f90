@@ -10,7 +10,7 @@ module result_summary
    use asperity_precision, only : dp
    use result_check, only : damage_type, find_damage
    use result_target, only : damage_of_result
-   use text_tools, only : in_one_line, in_quotes, to_text
+   use text_tools, only : in_one_line, in_quotes, next_line, to_text
    implicit none
    private
 
@@ -56,7 +56,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(damage_type) :: found
       character(:), allocatable :: part
-      integer :: at, next
+      integer :: at
 
       call find_damage(file, found)
       if (found%left_out > 0) text = text//'not read    the fields of the first '// &
@@ -64,14 +64,11 @@ contains
       if (found%parts == 0) return
       at = 1
       do while (at <= len(found%names))
-         next = index(found%names(at:), nl)
-         if (next == 0) next = len(found%names) - at + 2
-         part = found%names(at:at + next - 2)
+         call next_line(found%names, at, part)
          text = text//'damaged     '//part//nl
-         at = at + next
       end do
-      part = found%names
-      if (index(part, nl) > 0) part = part(:index(part, nl) - 1)
+      at = 1
+      call next_line(found%names, at, part)
       if (index(part, ': ') == 0) part = part//' cannot be read'
       if (found%parts > 1) part = part//', and '//to_text(found%parts - 1)//' more'
       call fail(error, error_file, path//': the file is damaged: '//part)
@@ -205,17 +202,15 @@ contains
       type(hdf5_file_type), intent(inout) :: file
       character(*), intent(in) :: name
       character(:), allocatable, intent(inout) :: text
-      character(:), allocatable :: lines
-      integer :: at, next
+      character(:), allocatable :: line, lines
+      integer :: at
 
       if (.not. file%has_attribute('/', name)) return
       call file%read_attribute('/', name, lines)
       at = 1
       do while (at <= len(lines))
-         next = index(lines(at:), nl)
-         if (next == 0) next = len(lines) - at + 2
-         if (next > 1) text = text//'warning     '//in_one_line(lines(at:at + next - 2), 400)//nl
-         at = at + next
+         call next_line(lines, at, line)
+         if (len(line) > 0) text = text//'warning     '//in_one_line(line, 400)//nl
       end do
    end subroutine add_warnings
 

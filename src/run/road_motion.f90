@@ -55,7 +55,7 @@ contains
 
       call self%work%lend('moved field', moved)
       call shift_field(self%grid, cells, self%state%pressure, moved)
-      if (self%side%adhesive .and. self%grid%boundary == boundary_periodic) &
+      if (self%normal%adhesive .and. self%grid%boundary == boundary_periodic) &
          call shift_field(self%grid, cells, self%state%gap, moved)
       if (self%rubs()) then
          do c = 1, 2

@@ -16,7 +16,7 @@ module row_account
    !> The outcome of solving a step.
    type :: found_step_type
       type(solver_result_type) :: normal             !! all normal solves
-      type(solver_result_type) :: rubbing            !! all tangential solves
+      type(solver_result_type) :: tangential         !! all tangential solves
       integer :: passes = 0                          !! of a step with friction
       real(dp) :: mismatch = 0.0_dp                  !! coupling residual of the last pass
       real(dp) :: viscous_force(2) = 0.0_dp          !! steady rows: mean of -P grad H, from the losses, Pa
@@ -62,7 +62,7 @@ contains
          row%friction = dot_product(force, contact%state%direction)/row%force
       call fill_solution(contact, found, row)
       call book_outside(contact%state%row, contact%state%drive_force, force, inertia, &
-         plan%steady .or. (plan%instantaneous .and. .not. plan%ramped), contact%side%adhesive, row)
+         plan%steady .or. (plan%instantaneous .and. .not. plan%ramped), contact%normal%adhesive, row)
       contact%state%drive_force = force
       contact%state%row = row
    end subroutine account
@@ -81,13 +81,13 @@ contains
       do j = 1, contact%grid%rows()
          associate (pressure => contact%state%pressure(:, j))
             rows(1, j) = sum(pressure)
-            touching = touches(contact%side%adhesive, pressure, contact%state%gap(:, j))
+            touching = touches(contact%normal%adhesive, pressure, contact%state%gap(:, j))
             rows(2, j) = count(touching)
             rows(3, j) = sum(contact%state%gap(:, j))
             if (.not. contact%slides) cycle
             rows(4, j) = sum(pressure*contact%slope_x(:, j))
             rows(5, j) = sum(pressure*contact%slope_y(:, j))
-            if (.not. contact%side%adhesive) cycle
+            if (.not. contact%normal%adhesive) cycle
             rows(6, j) = sum(pressure*contact%slope_x(:, j), .not. touching)
             rows(7, j) = sum(pressure*contact%slope_y(:, j), .not. touching)
          end associate
@@ -127,7 +127,7 @@ contains
       type(history_row_type), intent(inout) :: row
 
       associate (books => contact%state%books)
-         row%energy_adhesive = contact%side%energy(contact%state%gap)
+         row%energy_adhesive = contact%normal%energy(contact%state%gap)
          row%work_normal = books%work + row%energy_adhesive
          row%energy_elastic = books%stored
          row%dissipated_viscous = books%dissipated
@@ -149,7 +149,7 @@ contains
          call contact%tangential%sums(t, traction, row%stick_area, slip)
          row%traction_x = traction(1)
          row%traction_y = traction(2)
-         if (contact%tangential%law%slope .and. t%moved) force = outside
+         if (contact%tangential%law%slope_effect .and. t%moved) force = outside
          force = force + traction*contact%grid%area()
          row%sliding_speed = 0.0_dp
          if (plan%dt > 0.0_dp) then
@@ -207,12 +207,12 @@ contains
       row%iterations_normal = found%normal%iterations
       row%residual_normal = found%normal%residual
       if (contact%frictional) then
-         row%iterations_tangential = found%rubbing%iterations
-         row%residual_tangential = found%rubbing%residual
+         row%iterations_tangential = found%tangential%iterations
+         row%residual_tangential = found%tangential%residual
       end if
       row%passes = found%passes
       row%residual_coupling = found%mismatch
-      row%ffts = real(found%normal%ffts + found%rubbing%ffts, dp)
+      row%ffts = real(found%normal%ffts + found%tangential%ffts, dp)
       row%seconds = found%normal%seconds
    end subroutine fill_solution
 

@@ -14,7 +14,7 @@ module row_state
    use history_list, only : list_columns
    use history_row, only : history_row_type
    use state_table, only : state_table_type
-   use steady_step, only : steady_start_type
+   use steady_step, only : steady_start_type, steady_state_type
    use stick_slip_watch, only : stick_slip_watch_type
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : energy_books_type
@@ -22,18 +22,11 @@ module row_state
    implicit none
    private
 
-   public :: list_state, state_type, steady_state_type
+   public :: list_state, state_type
 
    integer, parameter, public :: edge_clear = 0     !! nothing near the edge of a free map
    integer, parameter, public :: edge_near = 1      !! points enter or leave the map close to the rubber
    integer, parameter, public :: edge_touches = 2   !! cells at the edge touch
-
-   !> The part of the state that belongs to steady sliding.
-   type :: steady_state_type
-      logical :: now = .false.                      !! the last row was one of steady sliding
-      real(dp) :: base(2) = 0.0_dp                  !! place of the road without the offset, m
-      type(steady_start_type) :: last, before       !! states of the last two rows
-   end type steady_state_type
 
    !> The state.
    type :: state_type
@@ -49,7 +42,7 @@ module row_state
       real(dp) :: first_mismatch = 1.0_dp           !! left by the first pass of the last step
       logical :: passes_reported = .false.              !! a warning of passes that did not settle was given
       logical :: motion_reported = .false.                 !! a warning of a pull that moves the road far was given
-      type(stick_slip_watch_type) :: watch          !! observations of the mean slip
+      type(stick_slip_watch_type) :: stick_slip     !! observations of the mean slip
       type(patch_size_type) :: widest               !! best resolved patches of contact at the end of a phase
       integer :: edge = edge_clear                  !! worst found at the edge of a free map
       real(dp) :: dt_old = 0.0_dp                   !! length of the last step, s; 0 after a jump
@@ -81,10 +74,10 @@ contains
       call table%add('widest/across', state%widest%across, '1', 'most cells across a patch of contact where a phase ended')
       call table%add('widest/needed', state%widest%needed, '1', 'cells across that such patches need')
       call table%add('edge', state%edge, 'worst finding at the edge of a free map')
-      call table%add('stick_slip/reported', state%watch%reported, 'a warning of stick-slip was given')
-      call table%add('stick_slip/speed', state%watch%speed, 'm/s', 'mean slip speed')
-      call table%add('stick_slip/change', state%watch%change, 'm/s', 'its change in the last step')
-      call table%add('stick_slip/turns', state%watch%turns, 'alternations of that change')
+      call table%add('stick_slip/reported', state%stick_slip%reported, 'a warning of stick-slip was given')
+      call table%add('stick_slip/speed', state%stick_slip%speed, 'm/s', 'mean slip speed')
+      call table%add('stick_slip/change', state%stick_slip%change, 'm/s', 'its change in the last step')
+      call table%add('stick_slip/turns', state%stick_slip%turns, 'alternations of that change')
       call table%add('passes/reported', state%passes_reported, &
          'a warning of passes that did not settle was given')
       call table%add('pull/reported', state%motion_reported, 'a warning of a pull that moves the road far was given')

@@ -180,8 +180,7 @@ contains
       if (allocated(error)) return
       call self%result%reopen(self%path, id, sim%state%row%step, &
          sim%case%output%compression, error)
-      if (allocated(error)) return
-      call self%result%write_text('outcome', 'running', error)
+      if (.not. allocated(error)) call self%result%write_text('outcome', 'running', error)
       call resume_warnings(self, sim, error)
    end subroutine resume_result
 

@@ -35,8 +35,7 @@ contains
       call list_state(sim%state, table)
       table%grid = sim%grid
       call reader%get_state(table, error)
-      if (allocated(error)) return
-      call sim%resume()
+      if (.not. allocated(error)) call sim%resume()
    end subroutine load_state
 
 end module simulation_state

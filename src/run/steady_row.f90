@@ -1,9 +1,10 @@
 !> A row of steady sliding within a run: its state, and the state of the arms if the run continues in time.
 module steady_row
    use asperity_parallel, only : any_process
-   use asperity_precision, only : dp, int8
+   use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
+   use friction_law, only : contact_open, contact_slip, contact_stick
    use row_account, only : found_step_type
    use steady_bound, only : largest_force
    use steady_contact, only : steady_contact_type
@@ -18,7 +19,7 @@ module steady_row
 
 contains
 
-   !> Find the state of the row, and replace the state before by it. A solve that was stopped leaves the state unchanged.
+   !> Solve the row, and make its contact the state. After a solve that was stopped the caller restores the state.
    subroutine solve_steady_row(contact, steady, plan, found)
       class(contact_type), intent(inout) :: contact
       type(steady_step_type), intent(inout) :: steady
@@ -26,16 +27,10 @@ contains
       type(found_step_type), intent(inout) :: found
 
       associate (state => contact%state)
-         steady%base = state%steady%base
-         call steady%last%copy(state%steady%last)
-         call steady%before%copy(state%steady%before)
-         if (.not. state%steady%now) call steady%begin_curve([state%row%road_x, state%row%road_y])
-         call steady%solve(plan, contact%road, found%normal, found%rubbing)
+         if (.not. state%steady%now) call state%steady%begin_curve([state%row%road_x, state%row%road_y])
+         call steady%solve(plan, contact%road, state%steady, found%normal, found%tangential)
          if (found%normal%stopped) return
          state%steady%now = .true.
-         state%steady%base = steady%base
-         call state%steady%last%copy(steady%last)
-         call state%steady%before%copy(steady%before)
       end associate
       found%viscous_force = steady%viscous_force
       found%power_viscous = steady%losses%normal + steady%losses%tangential
@@ -102,16 +97,17 @@ contains
             state%displacement(i, :, j) = found%displacement(i, :, j)
             slope = [found%slope_x(i, j), found%slope_y(i, j)]
             star = tangential%law%normal_traction(found%pressure(i, j), slope)
-            state%contact(i, j) = 0_int8
+            state%contact(i, j) = contact_open
             state%rubbing(i, :, j) = 0.0_dp
             if (found%pressure(i, j) <= 0.0_dp .and. .not. any(abs(found%traction(i, :, j)) > 0.0_dp)) cycle
             state%rubbing(i, :, j) = state%traction(i, :, j) - star
-            state%contact(i, j) = 2_int8
+            state%contact(i, j) = contact_slip
             if (.not. found%pressure(i, j) > 0.0_dp) cycle       ! partly sheared: it slips
             ! A traction that is only known to the tolerance may lie within the bound though the cell slips. The slip
             ! decides: added to the traction, it takes a slipping cell far out of the bound.
             pushed = state%rubbing(i, :, j) + largest_force(tangential%law, found%pressure(i, j))*found%slip(i, :, j)
-            if (tangential%law%bound_ratio(found%pressure(i, j), slope, pushed) > within) state%contact(i, j) = 1_int8
+            if (tangential%law%bound_ratio(found%pressure(i, j), slope, pushed) > within) &
+               state%contact(i, j) = contact_stick
          end do
       end do
       state%rubbed(:, :) = state%contact

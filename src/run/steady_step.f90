@@ -40,7 +40,7 @@ module steady_step
    implicit none
    private
 
-   public :: new_steady_step, steady_start_type, steady_step_type
+   public :: new_steady_step, steady_start_type, steady_state_type, steady_step_type
 
    !> A state from which a later row may start.
    type :: steady_start_type
@@ -54,20 +54,27 @@ module steady_step
       procedure :: copy
    end type steady_start_type
 
-   !> The solvers and the last states. A variable of this type must not be copied.
+   !> What a row of steady sliding leaves to the next one.
+   type :: steady_state_type
+      logical :: now = .false.                         !! the last row was one of steady sliding
+      real(dp) :: base(2) = 0.0_dp                     !! displacement of the road without the offset, m
+      type(steady_start_type) :: last, before          !! states of the last two rows
+   contains
+      procedure :: begin_curve
+   end type steady_state_type
+
+   !> The solvers and the present row. A variable of this type must not be copied.
    type :: steady_step_type
       type(grid_type) :: grid
       logical :: frictional = .false.
       type(friction_law_type) :: law
       type(medium_type) :: medium
-      type(steady_contact_type) :: contact             !! the state of the last row
-      type(steady_losses_type) :: losses               !! of that state
-      real(dp) :: base(2) = 0.0_dp                     !! displacement of the road without the offset, m
-      real(dp) :: place(2) = 0.0_dp                    !! displacement of the road in the last row, m
+      type(steady_contact_type) :: contact             !! the contact of the row
+      type(steady_losses_type) :: losses               !! of that contact
+      real(dp) :: place(2) = 0.0_dp                    !! displacement of the road, m
       real(dp) :: viscous_force(2) = 0.0_dp            !! mean of -P grad H, from the losses, Pa
       real(dp) :: power_friction = 0.0_dp              !! W over the cell
       real(dp) :: scheme_dt = 0.0_dp                   !! for tests: symbols of a scheme with this step, s
-      type(steady_start_type) :: last, before          !! states of the last two rows
       real(dp), private :: tolerance = 1e-6_dp
       integer, private :: max_iterations = 1000
       real(dp), private :: rms_height = 0.0_dp
@@ -80,15 +87,15 @@ module steady_step
       procedure :: solve
       procedure :: remember_normal
       procedure :: remember_tangential
-      procedure :: begin_curve
       procedure :: destroy
    end type steady_step_type
 
 contains
 
-   !> Prepare the solvers that a case needs.
-   subroutine new_steady_step(self, case, rms_height, error)
+   !> Prepare the solvers that a case needs, and a state without earlier rows.
+   subroutine new_steady_step(self, state, case, rms_height, error)
       type(steady_step_type), intent(out) :: self
+      type(steady_state_type), intent(out) :: state
       type(case_type), intent(in) :: case
       real(dp), intent(in) :: rms_height               !! of the road about its mean, m
       type(error_type), allocatable, intent(out) :: error
@@ -118,9 +125,9 @@ contains
          else
             allocate (c%traction(nx, 2, 0), c%displacement(nx, 2, 0), c%slip(nx, 2, 0))
          end if
-         allocate (self%last%pressure, self%last%gap, source=c%pressure)
-         allocate (self%last%traction, source=c%traction)
-         call self%before%copy(self%last)
+         allocate (state%last%pressure, state%last%gap, source=c%pressure)
+         allocate (state%last%traction, source=c%traction)
+         call state%before%copy(state%last)
       end associate
       if (self%frictional) then
          self%law = new_friction_law(trim(case%friction%law), case%friction%coefficient, &
@@ -152,7 +159,7 @@ contains
 
    !> Discard the states of earlier rows, and set the displacement of the road for the next steady row.
    subroutine begin_curve(self, place)
-      class(steady_step_type), intent(inout) :: self
+      class(steady_state_type), intent(inout) :: self
       real(dp), intent(in) :: place(2)                 !! of the road, m
 
       self%base = place
@@ -160,13 +167,13 @@ contains
       self%before%known = .false.
    end subroutine begin_curve
 
-   !> Find the state of a row: the contact, the displacement of the road, and the losses.
-   subroutine solve(self, plan, road, outcome, rubbing)
+   !> Solve a row: find the contact, the displacement of the road, and the losses.
+   subroutine solve(self, plan, road, state, normal, tangential)
       class(steady_step_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       type(interpolation_type), intent(inout) :: road
-      type(solver_result_type), intent(out) :: outcome   !! of the pressure
-      type(solver_result_type), intent(out) :: rubbing   !! of the traction
+      type(steady_state_type), intent(inout) :: state   !! unchanged if the solve is stopped
+      type(solver_result_type), intent(out) :: normal, tangential
       type(steady_symbols_type) :: symbols
       type(normal_problem_type) :: problem
       type(sliding_outcome_type) :: both
@@ -181,26 +188,26 @@ contains
       problem%tolerance = self%tolerance
       problem%max_iterations = self%max_iterations
       problem%rms_height = self%rms_height
-      call start_from(self, problem)
+      call start_from(self, state, problem)
 
-      rubbing%converged = .true.
-      call shifted(road, self%base(1), self%base(2), self%contact%height, self%contact%slope_x, &
+      tangential%converged = .true.
+      call shifted(road, state%base(1), state%base(2), self%contact%height, self%contact%slope_x, &
          self%contact%slope_y)
       if (self%frictional) then
          self%coupled%direction = self%medium%velocity/norm2(self%medium%velocity)
-         self%coupled%base = self%base
+         self%coupled%base = state%base
          call self%coupled%solve(self%operator, problem, road, self%contact, both)
-         outcome = both%normal
-         rubbing = both%rubbing
-         if (.not. outcome%stopped) call add_mean_shear(self)
+         normal = both%normal
+         tangential = both%tangential
+         if (.not. normal%stopped) call add_mean_shear(self)
       else
          call self%normal%solve(self%operator, problem, self%contact%height, self%contact%pressure, &
-            self%contact%gap, self%contact%level, outcome)
+            self%contact%gap, self%contact%level, normal)
       end if
-      if (outcome%stopped) return
-      self%place = self%base + self%contact%offset
+      if (normal%stopped) return
+      self%place = state%base + self%contact%offset
       call find_losses(self)
-      call keep_state(self, problem%target)
+      call keep_state(self, problem%target, state)
    end subroutine solve
 
    !> Add the mean mode of the displacement: the shear of a block of finite thickness.
@@ -217,16 +224,17 @@ contains
    end subroutine add_mean_shear
 
    !> Set the start of a row: none, the last state, or an extrapolation of the last two.
-   subroutine start_from(self, problem)
+   subroutine start_from(self, state, problem)
       type(steady_step_type), intent(inout) :: self
+      type(steady_state_type), intent(in) :: state
       type(normal_problem_type), intent(inout) :: problem
       real(dp) :: part, scale
       integer :: j
 
-      problem%warm = self%last%known
+      problem%warm = state%last%known
       if (.not. problem%warm) return
-      part = extrapolation(self, problem%target)
-      associate (c => self%contact, a => self%last, b => self%before)
+      part = extrapolation(state, self%medium%velocity, problem%target)
+      associate (c => self%contact, a => state%last, b => state%before)
          scale = field_sum(a%pressure)/max(field_sum(a%gap), field_sum(b%gap), tiny(1.0_dp))
          do j = 1, self%grid%rows()
             ! Pressure and gap are extrapolated as one quantity: the pressure if positive, the scaled gap if negative.
@@ -245,19 +253,20 @@ contains
    end subroutine start_from
 
    !> The distance of an extrapolation along the line through the last two states, over that of both; 0: none.
-   pure function extrapolation(self, target) result(part)
-      type(steady_step_type), intent(in) :: self
+   pure function extrapolation(state, velocity, target) result(part)
+      type(steady_state_type), intent(in) :: state
+      real(dp), intent(in) :: velocity(2)              !! of the road in the row, m/s
       real(dp), intent(in) :: target                   !! mean pressure of the row, Pa
       real(dp) :: part
       real(dp) :: speed(3), turn, load(3)
       real(dp), parameter :: same = 1e-9_dp, farthest = 2.0_dp
 
       part = 0.0_dp
-      if (.not. self%before%known) return
-      speed = log([norm2(self%before%velocity), norm2(self%last%velocity), norm2(self%medium%velocity)])
-      load = log([self%before%pressure_mean, self%last%pressure_mean, target])
-      turn = norm2(self%medium%velocity/exp(speed(3)) - self%last%velocity/exp(speed(2))) &
-         + norm2(self%last%velocity/exp(speed(2)) - self%before%velocity/exp(speed(1)))
+      if (.not. state%before%known) return
+      speed = log([norm2(state%before%velocity), norm2(state%last%velocity), norm2(velocity)])
+      load = log([state%before%pressure_mean, state%last%pressure_mean, target])
+      turn = norm2(velocity/exp(speed(3)) - state%last%velocity/exp(speed(2))) &
+         + norm2(state%last%velocity/exp(speed(2)) - state%before%velocity/exp(speed(1)))
       if (turn > same) return
       if (maxval(load) - minval(load) <= same .and. abs(speed(2) - speed(1)) > same) then
          part = (speed(3) - speed(2))/(speed(2) - speed(1))
@@ -267,19 +276,22 @@ contains
       if (abs(part) > farthest) part = 0.0_dp
    end function extrapolation
 
-   !> Keep the state of the row for the next ones.
-   subroutine keep_state(self, target)
-      type(steady_step_type), intent(inout) :: self
-      real(dp), intent(in) :: target
+   !> Keep the contact of the row for the next ones.
+   subroutine keep_state(self, target, state)
+      type(steady_step_type), intent(in) :: self
+      real(dp), intent(in) :: target                   !! mean pressure of the row, Pa
+      type(steady_state_type), intent(inout) :: state
 
-      if (self%last%known) call self%before%copy(self%last)
-      self%last%known = .true.
-      self%last%pressure_mean = target
-      self%last%velocity = self%medium%velocity
-      self%last%pressure = self%contact%pressure
-      ! In contact the gap is round-off. Where all cells touch, it would outweigh the pressure in the next start.
-      self%last%gap = merge(0.0_dp, max(self%contact%gap, 0.0_dp), self%contact%pressure > 0.0_dp)
-      self%last%traction = self%contact%traction
+      associate (last => state%last)
+         if (last%known) call state%before%copy(last)
+         last%known = .true.
+         last%pressure_mean = target
+         last%velocity = self%medium%velocity
+         last%pressure(:, :) = self%contact%pressure
+         ! In contact the gap is round-off. Where all cells touch, it would outweigh the pressure in the next start.
+         last%gap(:, :) = merge(0.0_dp, max(self%contact%gap, 0.0_dp), self%contact%pressure > 0.0_dp)
+         last%traction(:, :, :) = self%contact%traction
+      end associate
    end subroutine keep_state
 
    !> Compute the losses of the state, and the forces that follow from them.

@@ -67,19 +67,15 @@ contains
          if (size(material%prony_tau) == 0) then
             call fail(error, error_input, 'temperature: the material is elastic: it has no '// &
                'relaxation times to shift')
-            return
-         end if
-         if (.not. material%wlf_c2 > 0.0_dp) then
+         else if (.not. material%wlf_c2 > 0.0_dp) then
             call fail(error, error_input, 'temperature: the case needs wlf_c1 and wlf_c2')
-            return
-         end if
-         if (.not. (ieee_is_finite(temperature) .and. &
+         else if (.not. (ieee_is_finite(temperature) .and. &
             temperature > material%reference_temperature - material%wlf_c2)) then
             call fail(error, error_input, 'temperature = '//to_text(temperature)// &
                ': must be above reference_temperature - wlf_c2 = '// &
                to_text(material%reference_temperature - material%wlf_c2))
-            return
          end if
+         if (allocated(error)) return
          factor = shift(temperature)/shift(start_temperature)
          if (.not. (factor > 1.0e-100_dp .and. factor < 1.0e100_dp)) then
             call fail(error, error_input, 'temperature = '//to_text(temperature)// &

@@ -23,7 +23,7 @@ contains
       character(:), allocatable :: message
 
       message = ''
-      call check_edge(contact%grid, merge(contact%case%adhesion%range, 0.0_dp, contact%side%adhesive), &
+      call check_edge(contact%grid, merge(contact%case%adhesion%range, 0.0_dp, contact%normal%adhesive), &
          contact%rms_height, plan%road - [contact%state%row%road_x, contact%state%row%road_y], contact%state, message)
       call add_warning(warnings, contact%state%schedule%row, plan%time, message)
    end subroutine watch_edge
@@ -37,7 +37,7 @@ contains
 
       associate (state => contact%state)
          if (state%schedule%phase == plan%phase) return
-         call watch_contact_size(contact%grid, measured_patches(contact%grid, contact%side%adhesive, &
+         call watch_contact_size(contact%grid, measured_patches(contact%grid, contact%normal%adhesive, &
             state%pressure, state%gap), state%schedule%phase > size(contact%case%phases), &
             state%widest, message)
          call add_warning(warnings, state%schedule%row, plan%time, message)
@@ -56,7 +56,7 @@ contains
       speed = hypot(plan%velocity(1), plan%velocity(2))
       ! A block that comes to rest after its road has stopped is not stick-slip.
       if (.not. plan%dt*speed > 0.0_dp) return
-      call watch_slip(contact%state%watch, contact%state%row%sliding_speed, speed, &
+      call watch_slip(contact%state%stick_slip, contact%state%row%sliding_speed, speed, &
          contact%case%solver%passes, contact%case%material%density, message)
       call add_warning(warnings, contact%state%schedule%row, plan%time, message)
    end subroutine watch_stick_slip

@@ -9,6 +9,7 @@ module tangential_state
    use asperity_precision, only : dp, int8
    use block_motion, only : block_motion_type
    use case_settings, only : case_type
+   use friction_law, only : contact_open, contact_stick
    use regular_grid, only : grid_type
    use place_forecast, only : new_place_forecast, place_forecast_type
    use viscoelastic_energy, only : energy_books_type, new_books
@@ -54,7 +55,8 @@ contains
       self%block%area = grid%area()
       allocate (self%traction(grid%nx, 2, grid%rows()), source=0.0_dp)
       allocate (self%before, self%displacement, self%rubbing, source=self%traction)
-      allocate (self%contact(grid%nx, grid%rows()), self%rubbed(grid%nx, grid%rows()), source=0_int8)
+      allocate (self%contact(grid%nx, grid%rows()), self%rubbed(grid%nx, grid%rows()), &
+         source=contact_open)
       call new_place_forecast(self%forecast, grid%nx, grid%rows())
       call new_arm_state(self%arms, material, grid%nx, grid%rows(), 2, error)
       call new_books(self%books, material, grid%cell_area())
@@ -75,7 +77,7 @@ contains
       do j = 1, size(self%contact, 2)
          do i = 1, size(self%contact, 1)
             t = self%traction(i, :, j)
-            if (self%contact(i, j) == 1_int8) self%traction(i, :, j) = t + factor*(t - self%before(i, :, j))
+            if (self%contact(i, j) == contact_stick) self%traction(i, :, j) = t + factor*(t - self%before(i, :, j))
             self%before(i, :, j) = t
          end do
       end do

@@ -17,10 +17,9 @@ module tangential_step
    use friction_books, only : book_friction, rubbed_type
    use field_sums, only : field_count, vector_sum
    use fft_conv, only : columns_apply, convolution_type, new_convolution
-   use friction_cg, only : friction_fast, friction_fields_type, friction_solver_type, friction_thesis, &
-      new_friction_solver
-   use friction_law, only : friction_law_type, new_friction_law
-   use asperity_precision, only : dp, int8
+   use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
+   use friction_law, only : contact_stick, friction_law_type, new_friction_law
+   use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use road_pull, only : road_pull_type
    use rubber_kernels, only : tangential_kernel
@@ -46,7 +45,7 @@ module tangential_step
       logical, private :: foresees = .true.           !! `slip` serves as a forecast, except with the thesis's method
       logical, private :: slip_expected = .false.     !! `slip` is about that of the step
       logical :: pulled(2) = .false.                  !! the road is pulled by a force along x, y
-      type(road_pull_type) :: road                    !! that force, and the motion that follows from it
+      type(road_pull_type) :: road_pull                    !! that force, and the motion that follows from it
       !> The share of its bound that each cell may carry [nx, rows]. If it is not allocated, cells in contact carry the
       !> whole bound.
       real(dp), allocatable :: share(:, :)
@@ -92,8 +91,7 @@ contains
       call new_convolution(self%operator, self%grid, tangential_kernel(case%material), error)
       if (allocated(error)) return
       self%compliance = self%operator%symbols%self_compliance(with_mean=self%grid%boundary /= boundary_periodic)
-      call new_friction_solver(self%solver, self%grid, self%operator, error, &
-         merge(friction_thesis, friction_fast, case%solver%method == 'thesis'))
+      call new_friction_solver(self%solver, self%grid, self%operator, error, trim(case%solver%method))
       self%solver%max_iterations = case%solver%max_iterations
       self%solver%accepted = case%solver%tolerance
       ! The passes judge by the displacements whether a step is solved.
@@ -122,7 +120,7 @@ contains
       self%pulled = pulled
       self%solver%pull%along = pulled
       self%solver%near = .false.
-      call self%road%begin(pull, motion, self%q)
+      call self%road_pull%begin(pull, motion, self%q)
       if (allocated(self%share)) deallocate (self%share)
       self%slip_expected = .false.
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
@@ -146,7 +144,7 @@ contains
       ! On a free grid there is no mean mode to set.
       if (self%grid%boundary == boundary_periodic) call self%operator%symbols%set_mean_compliance(height)
       if (any(pulled) .and. state%block%mass > 0.0_dp) then
-         call self%road%place_mass(state%block, mean, dt)
+         call self%road_pull%place_mass(state%block, mean, dt)
          do c = 1, 2
             if (pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
          end do
@@ -163,9 +161,9 @@ contains
 
       if (.not. any(self%pulled)) return
       beside = 0.0_dp
-      if (self%adhesive .or. .not. self%law%slope) &
-         beside = force_beside(state%contact, self%law%slope, pressure, slope_x, slope_y)/self%grid%cells()
-      call self%road%set_pull(self%solver%pull, state%block, beside)
+      if (self%adhesive .or. .not. self%law%slope_effect) &
+         beside = force_beside(state%contact, self%law%slope_effect, pressure, slope_x, slope_y)/self%grid%cells()
+      call self%road_pull%set_pull(self%solver%pull, state%block, beside)
    end subroutine set_pull
 
    !> Compute the motion of the pulled road from the solution.
@@ -174,8 +172,8 @@ contains
       type(tangential_state_type), intent(in) :: state
 
       if (.not. any(self%pulled)) return
-      call self%road%find_motion(self%solver%pull, state%block, self%past_mean)
-      if (self%road%slides_off) call self%road%find_held(self%solver%pull, means(self, state%traction))
+      call self%road_pull%find_motion(self%solver%pull, state%block, self%past_mean)
+      if (self%road_pull%slides_off) call self%road_pull%find_held(self%solver%pull, means(self, state%traction))
    end subroutine find_motion
 
    !> Correct the displacements of a solved step for the motion of the pulled road, because they were computed with a
@@ -185,7 +183,7 @@ contains
       real(dp), intent(out) :: motion(2)              !! of the road in the step, m
       integer :: c, j
 
-      motion = self%road%motion
+      motion = self%road_pull%motion
       do c = 1, 2
          if (.not. self%pulled(c)) cycle
          !$omp parallel do default(none) shared(self, c, motion) private(j)
@@ -360,7 +358,7 @@ contains
 
       traction = means(self, state%traction)
       slip = means(self, self%slip)
-      stick = field_count(state%contact == 1_int8)/self%grid%cells()
+      stick = field_count(state%contact == contact_stick)/self%grid%cells()
    end subroutine sums
 
    !> Free plans and fields.

@@ -65,7 +65,7 @@ contains
       allocate (rows(2, size(contact, 2)))
       !$omp parallel do default(none) shared(contact, slope, pressure, slope_x, slope_y, rows) private(j, counts)
       do j = 1, size(contact, 2)
-         counts = contact(:, j) == 0_int8 .or. .not. slope
+         counts = contact(:, j) == contact_open .or. .not. slope
          rows(1, j) = sum(pressure(:, j)*slope_x(:, j), counts)
          rows(2, j) = sum(pressure(:, j)*slope_y(:, j), counts)
       end do

@@ -79,8 +79,7 @@ contains
       allocate (self%wide_runs(wide_rows), source=0)
    end subroutine new_active_blocks
 
-   !> Deactivate all blocks, and set the work fields to zero. The field of the step is used by other procedures
-   !> between solves, so that all of its cells must be set.
+   !> Deactivate all blocks, and set the work fields to zero.
    subroutine clear(self, residual, direction, search, step)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), without its border

@@ -41,24 +41,23 @@ contains
       type(kernel_type), intent(in) :: kernel               !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
       character(*), intent(in), optional :: method          !! 'fast' (default) or 'thesis' (periodic)
-      character(16) :: name
+      type(adhesion_fast_type), allocatable :: fast
+      type(adhesion_thesis_type), allocatable :: thesis
+      character(:), allocatable :: chosen
 
-      name = 'fast'
-      if (present(method)) name = method
-      select case (name)
+      chosen = 'fast'
+      if (present(method)) chosen = method
+      select case (chosen)
       case ('fast')
-         allocate (adhesion_fast_type :: self%method)
+         allocate (fast)
+         call new_adhesion_fast(fast, grid, kernel, error)
+         call move_alloc(fast, self%method)
       case ('thesis')
-         allocate (adhesion_thesis_type :: self%method)
+         allocate (thesis)
+         call new_adhesion_thesis(thesis, grid, kernel, error)
+         call move_alloc(thesis, self%method)
       case default
-         call fail(error, error_input, "method = '"//trim(name)//"': must be 'fast' or 'thesis'")
-         return
-      end select
-      select type (chosen => self%method)
-      type is (adhesion_fast_type)
-         call new_adhesion_fast(chosen, grid, kernel, error)
-      type is (adhesion_thesis_type)
-         call new_adhesion_thesis(chosen, grid, kernel, error)
+         call fail(error, error_input, "method = '"//chosen//"': must be 'fast' or 'thesis'")
       end select
    end subroutine new_adhesion_solver
 

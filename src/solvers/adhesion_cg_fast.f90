@@ -310,17 +310,12 @@ contains
       count = real(self%work%patch%transforms(), dp) + self%work%model%transforms()
    end function transforms
 
-   !> Free plans and memory.
+   !> Free plans.
    subroutine destroy(self)
       class(adhesion_fast_type), intent(inout) :: self
 
       call self%work%patch%destroy()
       call self%work%model%destroy()
-      if (allocated(self%work%exchange)) deallocate (self%work%exchange, self%work%residual, &
-         self%work%direction, self%work%old, self%work%model_state, self%work%model_traction, &
-         self%work%change, self%work%has_correction, self%work%image, self%work%last_step, &
-         self%work%last_image, self%work%curvature)
-      if (allocated(self%state)) deallocate (self%state, self%traction)
    end subroutine destroy
 
 end module adhesion_cg_fast

@@ -63,12 +63,9 @@ contains
             "method = 'thesis': adhesion on a free grid: must be 'fast' there")
          return
       end if
+      allocate (self%residual(grid%nx, grid%rows()), source=0.0_dp)
+      allocate (self%direction, self%product, self%trial_gap, self%trial_traction, source=self%residual)
       call new_adhesion_patch(self%patch, grid, kernel, symbols, error)
-      if (allocated(error)) return
-      associate (nx => grid%nx, rows => self%patch%rows)
-         allocate (self%residual(nx, rows), self%direction(nx, rows), self%product(nx, rows), &
-            self%trial_gap(nx, rows), self%trial_traction(nx, rows), source=0.0_dp)
-      end associate
    end subroutine new_adhesion_thesis
 
    !> Solve an adhesive contact problem.
@@ -348,13 +345,11 @@ contains
       end do
    end subroutine accept
 
-   !> Free plans and memory.
+   !> Free plans.
    subroutine destroy(self)
       class(adhesion_thesis_type), intent(inout) :: self
 
       call self%patch%destroy()
-      if (allocated(self%residual)) deallocate (self%residual, self%direction, self%product, &
-         self%trial_gap, self%trial_traction)
    end subroutine destroy
 
 end module adhesion_cg_thesis

@@ -99,7 +99,6 @@ contains
          self%field(self%mx, self%coarse_halo%own + self%coarse_halo%foreign))
       call new_symbol_operator(self%inverse, shape_of_rows(self%mx, self%sharing, 1), error)
       call new_symbol_operator(self%missing, shape_of_rows(self%mx, self%sharing, 1), error)
-      if (allocated(error)) return
       call set_low_symbols(self, symbols, error)
    end subroutine new_adhesion_model
 
@@ -107,7 +106,7 @@ contains
    subroutine set_low_symbols(self, symbols, error)
       type(adhesion_model_type), intent(inout) :: self
       type(adhesion_symbols_type), intent(inout) :: symbols
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       real(dp), allocatable :: missing(:, :), inverse(:, :)
       real(dp) :: along_x(0:self%mx/2), along_y(0:self%my/2), kx, ky, passing
       integer :: modes(2), i, j

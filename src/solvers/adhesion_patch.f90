@@ -115,7 +115,6 @@ contains
       call share_unknowns(self, grid)
       if (.not. self%periodic) call new_convolution(self%operator, grid, kernel, error)
       call new_symbol_operator(self%stiffness, shape_of_rows(self%mx, self%sharing, 1), error)
-      if (allocated(error)) return
       call new_adhesion_symbols(symbols, grid, kernel, self%mx, self%my)
       call symbols%form(self%stiffness%modes(), error)
       if (allocated(error)) return
@@ -334,13 +333,12 @@ contains
       count = self%stiffness%ffts + self%operator%ffts
    end function transforms
 
-   !> Free plans and memory.
+   !> Free plans.
    subroutine destroy(self)
       class(adhesion_patch_type), intent(inout) :: self
 
       call self%stiffness%destroy()
       call self%operator%destroy()
-      if (allocated(self%psi)) deallocate (self%psi)
    end subroutine destroy
 
 end module adhesion_patch

@@ -43,9 +43,10 @@ contains
    subroutine form(self, modes, error)
       class(adhesion_symbols_type), intent(inout) :: self
       integer, intent(in) :: modes(2)                  !! first and last wave number; none if the last is less
-      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       real(dp), allocatable :: table(:, :, :)
 
+      if (allocated(error)) return
       if (.not. any_process(modes(1) < self%modes(1) .or. modes(2) > self%modes(2))) return
       self%modes = modes
       if (allocated(self%stiffness)) deallocate (self%stiffness, self%compliance)

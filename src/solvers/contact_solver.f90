@@ -16,7 +16,6 @@ module contact_solver
    type, abstract :: contact_solver_type
       type(grid_type) :: grid
       type(convolution_type) :: operator           !! A for the shear modulus 1 Pa
-      real(dp), allocatable :: step(:, :)          !! work field [nx, ny], free between solves
    contains
       procedure(solve_contact), deferred :: solve
       procedure :: destroy

@@ -12,7 +12,7 @@ module finite_fields
 
    public :: reject_overflow
 
-   character(*), parameter, public :: reason_overflow = 'numbers overflowed: a field is not finite'
+   character(*), parameter :: reason_overflow = 'numbers overflowed: a field is not finite'
 
 contains
 

@@ -36,7 +36,7 @@
 !> slopes steeper than 1/mu the traction has no bound uphill. If many points are on such slopes, a solution may not be
 !> found, or may not exist.
 module friction_cg
-   use asperity_errors, only : error_type
+   use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
    use fft_conv, only : convolution_type
    use friction_cg_fast, only : friction_fast_type, new_friction_fast
@@ -48,7 +48,6 @@ module friction_cg
    use friction_problem, only : friction_problem_type
    use friction_pull, only : friction_pull_type
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use kernels, only : kernel_type
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
@@ -56,10 +55,6 @@ module friction_cg
    private
 
    public :: friction_fields_type, friction_solver_type, new_friction_solver
-
-   integer, parameter, public :: friction_fast = 1
-   integer, parameter, public :: friction_thesis = 2
-   integer, parameter, public :: friction_gradient = 3
 
    integer, parameter :: most_moves = 60         !! largest number of moves of the springs
    integer, parameter :: idle_moves = 3          !! moves in full slip with little gain after which the pull is too large
@@ -101,7 +96,9 @@ contains
       type(grid_type), intent(in) :: grid
       type(convolution_type), intent(in) :: operator
       type(error_type), allocatable, intent(out) :: error
-      integer, intent(in), optional :: method        !! friction_fast (default), _thesis or _gradient
+      character(*), intent(in), optional :: method   !! 'fast' (default), 'thesis' or 'gradient'
+      type(friction_fast_type), allocatable :: fast
+      character(:), allocatable :: chosen
 
       self%periodic = grid%boundary == boundary_periodic
       self%length = max(grid%lx, grid%ly)
@@ -109,34 +106,21 @@ contains
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
       allocate (self%work%bound(grid%nx, 2, grid%rows()), self%work%tangent(grid%nx, 3, grid%rows()), &
          self%work%old(grid%nx, 2, grid%rows()), source=0.0_dp)
-      if (present(method)) then
-         call choose_method(self, method, grid, operator%kernel, error)
-      else
-         call choose_method(self, friction_fast, grid, operator%kernel, error)
-      end if
-   end subroutine new_friction_solver
-
-   !> Make the requested method.
-   subroutine choose_method(self, method, grid, kernel, error)
-      type(friction_solver_type), intent(inout) :: self
-      integer, intent(in) :: method
-      type(grid_type), intent(in) :: grid
-      type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
-      type(error_type), allocatable, intent(out) :: error
-
-      select case (method)
-      case (friction_thesis)
+      chosen = 'fast'
+      if (present(method)) chosen = method
+      select case (chosen)
+      case ('thesis')
          allocate (friction_thesis_type :: self%method)
-      case (friction_gradient)
+      case ('gradient')
          allocate (friction_gradient_type :: self%method)
+      case ('fast')
+         allocate (fast)
+         call new_friction_fast(fast, grid, operator%kernel, error)
+         call move_alloc(fast, self%method)
       case default
-         allocate (friction_fast_type :: self%method)
+         call fail(error, error_input, "method = '"//chosen//"': must be 'fast', 'thesis' or 'gradient'")
       end select
-      select type (chosen => self%method)
-      type is (friction_fast_type)
-         call new_friction_fast(chosen, grid, kernel, error)
-      end select
-   end subroutine choose_method
+   end subroutine new_friction_solver
 
    !> Solve for T, starting from the T given.
    subroutine solve(self, operator, law, fields, result)
@@ -287,12 +271,11 @@ contains
       if (.not. problem%fresh) call problem%refresh_slip(operator)
    end subroutine move_springs
 
-   !> Free the preconditioner and the work space.
+   !> Free the plans of the method.
    subroutine destroy(self)
       class(friction_solver_type), intent(inout) :: self
 
       if (allocated(self%method)) call self%method%destroy()
-      if (allocated(self%work%old)) deallocate (self%work%bound, self%work%tangent, self%work%old)
    end subroutine destroy
 
 end module friction_cg

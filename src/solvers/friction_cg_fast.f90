@@ -96,9 +96,8 @@ contains
       type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
       type(error_type), allocatable, intent(out) :: error
 
-      call new_friction_preconditioner(self%preconditioner, grid, kernel, error)
-      if (allocated(error)) return
       allocate (self%d(grid%nx, 2, grid%rows()), source=0.0_dp)
+      call new_friction_preconditioner(self%preconditioner, grid, kernel, error)
    end subroutine new_friction_fast
 
    !> Iterate (see `friction_method_type`). If the conjugate gradients stall, the fallback alternates with them.
@@ -124,7 +123,7 @@ contains
          if (self%stopped) exit
          if (problem%solved(goal%tolerance)) exit
       end do
-      self%ffts = self%preconditioner%ffts()
+      self%ffts = self%preconditioner%inverse%ffts
    end subroutine iterate
 
    !> Iterate by conjugate gradients until the problem is solved, the residual stalls, there is no direction of descent,
@@ -259,13 +258,11 @@ contains
       now%curvature = sums%curvature
    end subroutine form_direction
 
-   !> Free the preconditioner and the work field.
+   !> Free the plans of the preconditioner.
    subroutine destroy(self)
       class(friction_fast_type), intent(inout) :: self
 
       call self%preconditioner%destroy()
-      call self%fallback%destroy()
-      if (allocated(self%d)) deallocate (self%d)
    end subroutine destroy
 
 end module friction_cg_fast

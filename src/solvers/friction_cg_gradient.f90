@@ -27,7 +27,6 @@ module friction_cg_gradient
       real(dp), allocatable, private :: step(:, :, :)    !! [nx, 2, rows] s
    contains
       procedure :: iterate
-      procedure :: destroy
    end type friction_gradient_type
 
 contains
@@ -119,12 +118,5 @@ contains
       if (shortest < 0.5_dp*longest) alpha = shortest
       if (.not. shortest > 0.0_dp) alpha = first_alpha
    end function next_alpha
-
-   !> Free the work fields.
-   subroutine destroy(self)
-      class(friction_gradient_type), intent(inout) :: self
-
-      if (allocated(self%step)) deallocate (self%slip, self%step)
-   end subroutine destroy
 
 end module friction_cg_gradient

@@ -36,7 +36,6 @@ module friction_cg_thesis
       real(dp), allocatable, private :: tangent(:, :, :)     !! [nx, 2, rows] t
    contains
       procedure :: iterate
-      procedure :: destroy
    end type friction_thesis_type
 
 contains
@@ -167,12 +166,5 @@ contains
       g = 0.0_dp
       if (dd > 0.0_dp) g = r - (r(1)*d(1) + r(2)*d(2))/dd*d
    end subroutine perpendicular
-
-   !> Free the work fields.
-   subroutine destroy(self)
-      class(friction_thesis_type), intent(inout) :: self
-
-      if (allocated(self%gradient)) deallocate (self%gradient, self%direction, self%tangent)
-   end subroutine destroy
 
 end module friction_cg_thesis

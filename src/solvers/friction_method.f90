@@ -3,7 +3,7 @@
 !> A method iterates on a `friction_problem_type` until the problem is solved. It may also give up; the solver
 !> then finds that `solved` is false. A method calls `stop_is_due` (module `stop_watch`) once in each iteration, and
 !> returns with `stopped` if a stop is due. To add a method, extend the type, and add its name to
-!> `choose_method` of module `friction_cg`.
+!> `new_friction_solver` of module `friction_cg`.
 module friction_method
    use asperity_precision, only : dp, int64
    use fft_conv, only : convolution_type
@@ -26,7 +26,7 @@ module friction_method
       logical :: stopped = .false.           !! the last call of `iterate` was stopped
    contains
       procedure(iterate_method), deferred :: iterate
-      procedure(free_memory), deferred :: destroy
+      procedure :: destroy
    end type friction_method_type
 
    abstract interface
@@ -43,13 +43,13 @@ module friction_method
          integer, intent(inout) :: iterations         !! of the solve so far
       end subroutine iterate_method
 
-      !> Free plans and memory.
-      subroutine free_memory(self)
-         import :: friction_method_type
-         implicit none
-         class(friction_method_type), intent(inout) :: self
-      end subroutine free_memory
-
    end interface
+
+contains
+
+   !> Free the plans of a method. Here there are none.
+   subroutine destroy(self)
+      class(friction_method_type), intent(inout) :: self
+   end subroutine destroy
 
 end module friction_method

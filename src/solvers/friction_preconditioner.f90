@@ -45,7 +45,7 @@ module friction_preconditioner
 
    !> The preconditioner, and the results of its last use.
    type :: friction_preconditioner_type
-      type(convolution_type), private :: inverse         !! M
+      type(convolution_type) :: inverse                  !! M
       real(dp), private :: half_wave = 0.0_dp            !! mean compliance if the solid has none, m
       logical, private :: periodic = .true.
       real(dp), allocatable :: z(:, :, :)                !! [nx, 2, rows]
@@ -55,7 +55,6 @@ module friction_preconditioner
    contains
       procedure :: set_mean_stiffness
       procedure :: apply
-      procedure :: ffts
       procedure :: destroy
    end type friction_preconditioner_type
 
@@ -76,9 +75,8 @@ contains
       periodic%boundary = boundary_periodic
       block = kernel
       block%mean_mode = self%half_wave
-      call new_inverse_convolution(self%inverse, periodic, block, error)
-      if (allocated(error)) return
       allocate (self%z(grid%nx, 2, grid%rows()), source=0.0_dp)
+      call new_inverse_convolution(self%inverse, periodic, block, error)
    end subroutine new_friction_preconditioner
 
    !> Set the mean mode of M to the inverse of that of the operator.
@@ -154,49 +152,27 @@ contains
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
       type(z_sums_type), intent(inout) :: rows(:)
+      real(dp) :: g(problem%nx, 2)
       integer :: j
 
-      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
+      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j, g) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         call scale_row(self, problem, uniform, j, rows(j)%cross)
+         call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+            problem%work%tangent(:, :, j), self%z(:, :, j), g, rows(j)%cross)
+         call self%inverse%forward_row(1, j, g(:, 1))
+         call self%inverse%forward_row(2, j, g(:, 2))
       end do
       call self%inverse%columns(columns_apply)
       !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         call unscale_row(self, problem, uniform, j, rows(j))
+         call self%inverse%backward_row(1, j, self%z(:, 1, j))
+         call self%inverse%backward_row(2, j, self%z(:, 2, j))
+         call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+            problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
       end do
    end subroutine precondition_rows
-
-   !> Transform a row of w Z (g - H e c).
-   subroutine scale_row(self, problem, uniform, j, cross)
-      type(friction_preconditioner_type), intent(inout) :: self
-      type(friction_problem_type), intent(in) :: problem
-      type(uniform_type), intent(in) :: uniform
-      integer, intent(in) :: j
-      real(dp), intent(out) :: cross               !! g.z_old
-      real(dp) :: g(problem%nx, 2)
-
-      call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
-         problem%work%tangent(:, :, j), self%z(:, :, j), g, cross)
-      call self%inverse%forward_row(1, j, g(:, 1))
-      call self%inverse%forward_row(2, j, g(:, 2))
-   end subroutine scale_row
-
-   !> Transform a row back, and compute z in it.
-   subroutine unscale_row(self, problem, uniform, j, sums)
-      type(friction_preconditioner_type), intent(inout) :: self
-      type(friction_problem_type), intent(in) :: problem
-      type(uniform_type), intent(in) :: uniform
-      integer, intent(in) :: j
-      type(z_sums_type), intent(inout) :: sums     !! on entry with g.z_old
-
-      call self%inverse%backward_row(1, j, self%z(:, 1, j))
-      call self%inverse%backward_row(2, j, self%z(:, 2, j))
-      call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
-         problem%work%tangent(:, :, j), self%z(:, :, j), sums)
-   end subroutine unscale_row
 
    !> Compute K^-1 and (h/N) E. They are 0 if the mean mode is not treated separately.
    subroutine mean_mode(problem, inverse, coupling)
@@ -223,20 +199,11 @@ contains
       matrix = reshape([elements(1), elements(2), elements(2), elements(3)], [2, 2])
    end function matrix
 
-   !> Transforms so far.
-   pure function ffts(self) result(count)
-      class(friction_preconditioner_type), intent(in) :: self
-      integer :: count
-
-      count = self%inverse%ffts
-   end function ffts
-
-   !> Free the plans and the field.
+   !> Free the plans.
    subroutine destroy(self)
       class(friction_preconditioner_type), intent(inout) :: self
 
       call self%inverse%destroy()
-      if (allocated(self%z)) deallocate (self%z)
    end subroutine destroy
 
 end module friction_preconditioner

@@ -93,7 +93,7 @@ contains
 
       allocate (sizes(self%rows), cells(self%rows), foreseen(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
-         strength=self%law%strength_beside(), physical=self%law%slope .and. self%law%physical_slip, &
+         strength=self%law%strength_beside(), physical=self%law%slope_effect .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, deepest_inside=deepest_inside)
       !$omp parallel do default(none) shared(self, operator, sizes, cells, foreseen) private(j) &
       !$omp num_threads(self%threads)
@@ -192,7 +192,7 @@ contains
       real(dp) :: slope(2)
 
       slope = 0.0_dp
-      if (self%law%slope) slope = [self%slope_x(i, j), self%slope_y(i, j)]
+      if (self%law%slope_effect) slope = [self%slope_x(i, j), self%slope_y(i, j)]
    end function slope_at
 
    !> Gather what stays constant during a solve at the points of a row, in the columns that module
@@ -203,7 +203,7 @@ contains
       real(dp), intent(out) :: site(self%nx, site_columns)
 
       site(:, 1) = self%pressure(:, j)
-      if (self%law%slope) then
+      if (self%law%slope_effect) then
          site(:, 2) = self%slope_x(:, j)
          site(:, 3) = self%slope_y(:, j)
       else

@@ -117,13 +117,13 @@ contains
       real(dp), intent(inout), contiguous :: state(:)      !! [nx]
       type(move_sums_type), intent(out) :: sums
       real(dp) :: cx, cy, ex, ey, nd, m, s, limit, put, free, arrived, axis_x, axis_y, inverse
-      real(dp) :: moved, changed, size_of_t, missed_x, missed_y, xx, xy, yy
+      real(dp) :: returned, changed, size_of_t, missed_x, missed_y, xx, xy, yy
       logical :: out
       integer :: i
 
       cx = uniform(1)
       cy = uniform(2)
-      moved = 0.0_dp
+      returned = 0.0_dp
       changed = 0.0_dp
       size_of_t = 0.0_dp
       missed_x = 0.0_dp
@@ -132,7 +132,7 @@ contains
       xy = 0.0_dp
       yy = 0.0_dp
       !$omp simd private(ex, ey, nd, m, s, limit, put, out, free, arrived, axis_x, axis_y, inverse) &
-      !$omp reduction(+: moved, changed, size_of_t, missed_x, missed_y, xx, xy, yy)
+      !$omp reduction(+: returned, changed, size_of_t, missed_x, missed_y, xx, xy, yy)
       do i = 1, size(state)
          free = merge(1.0_dp - slips(i), 0.0_dp, state(i) > 0.5_dp)
          ex = t(i, 1) + free*cx + site(i, 1)*site(i, 2)
@@ -160,11 +160,11 @@ contains
          t(i, 1) = merge(ex, 0.0_dp, state(i) > 0.5_dp)
          t(i, 2) = merge(ey, 0.0_dp, state(i) > 0.5_dp)
          state(i) = merge(merge(2.0_dp, 1.0_dp, out .or. s <= k%on_bound), 0.0_dp, state(i) > 0.5_dp)
-         moved = moved + merge(1.0_dp, 0.0_dp, out)
+         returned = returned + merge(1.0_dp, 0.0_dp, out)
          changed = changed + (t(i, 1) - old(i, 1))**2 + (t(i, 2) - old(i, 2))**2
          size_of_t = size_of_t + t(i, 1)**2 + t(i, 2)**2
       end do
-      sums = move_sums_type(moved, changed, size_of_t, [missed_x, missed_y], [xx, xy, yy])
+      sums = move_sums_type(returned, changed, size_of_t, [missed_x, missed_y], [xx, xy, yy])
    end subroutine returned_row
 
    !> The ratio s of the bound: force/reach, 1 if both vanish, and unbounded if the reach is negative or alone vanishes.
@@ -235,12 +235,12 @@ contains
       real(dp), intent(in), contiguous :: tangent(:, :)    !! [nx, 3]
       type(measure_sums_type), intent(out) :: sums
       real(dp) :: ux, uy, ru, gx, gy, weight, bent
-      real(dp) :: slipping, driven, moved, wgx, wgy, wxx, wxy, wyy, cxx, cxy, cyy, gain, largest
+      real(dp) :: slipping, driving, displaced, wgx, wgy, wxx, wxy, wyy, cxx, cxy, cyy, gain, largest
       integer :: i
 
       slipping = 0.0_dp
-      driven = 0.0_dp
-      moved = 0.0_dp
+      driving = 0.0_dp
+      displaced = 0.0_dp
       wgx = 0.0_dp
       wgy = 0.0_dp
       wxx = 0.0_dp
@@ -253,7 +253,7 @@ contains
       largest = 0.0_dp
 
       !$omp simd private(ux, uy, ru, gx, gy, weight, bent) reduction(max: largest) &
-      !$omp reduction(+: slipping, driven, moved, wgx, wgy, wxx, wxy, wyy, cxx, cxy, cyy, gain)
+      !$omp reduction(+: slipping, driving, displaced, wgx, wgy, wxx, wxy, wyy, cxx, cxy, cyy, gain)
       do i = 1, size(state)
          ux = tangent(i, 1)
          uy = tangent(i, 2)
@@ -262,8 +262,8 @@ contains
          gx = merge(r(i, 1) - ru*ux, 0.0_dp, weight > 0.0_dp)
          gy = merge(r(i, 2) - ru*uy, 0.0_dp, weight > 0.0_dp)
          slipping = slipping + merge(1.0_dp, 0.0_dp, state(i) > 1.5_dp)
-         driven = driven + merge(drive(i, 1)**2 + drive(i, 2)**2, 0.0_dp, state(i) > 0.5_dp)
-         moved = moved + merge((drive(i, 1) - r(i, 1))**2 + (drive(i, 2) - r(i, 2))**2, 0.0_dp, &
+         driving = driving + merge(drive(i, 1)**2 + drive(i, 2)**2, 0.0_dp, state(i) > 0.5_dp)
+         displaced = displaced + merge((drive(i, 1) - r(i, 1))**2 + (drive(i, 2) - r(i, 2))**2, 0.0_dp, &
             state(i) > 0.5_dp)
          bent = compliance*(1.0_dp - weight)*weight
          wgx = wgx + weight*gx
@@ -278,7 +278,7 @@ contains
          largest = max(largest, gx**2 + gy**2)
       end do
 
-      sums = measure_sums_type(0.0_dp, slipping, driven, moved, [wgx, wgy], [wxx, wxy, wyy], &
+      sums = measure_sums_type(0.0_dp, slipping, driving, displaced, [wgx, wgy], [wxx, wxy, wyy], &
          [cxx, cxy, cyy], gain, largest)
    end subroutine measured_row
 

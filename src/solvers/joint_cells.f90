@@ -49,7 +49,7 @@ contains
       logical :: yes
 
       yes = self%law%jumps_at_edge()
-      if (.not. self%law%slope) return
+      if (.not. self%law%slope_effect) return
       yes = yes .or. self%attraction > 0.0_dp .or. self%law%reach_coefficient()*hypot(slope_x, slope_y) > 1.0_dp
    end function has_jump
 

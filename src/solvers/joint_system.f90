@@ -12,7 +12,7 @@
 !> tractions by that pressure or by the strength, whichever is larger.
 module joint_system
    use asperity_precision, only : dp
-   use field_sums, only : field_count, field_sum
+   use field_sums, only : field_count, field_sum, largest_of_rows, row_totals, threads_for
    use gmres, only : cell_vector_type
    use joint_cells, only : cell_rules_type
    use regular_grid, only : grid_type
@@ -52,7 +52,9 @@ module joint_system
       procedure(evaluate_state), deferred :: evaluate
       procedure :: renew
       procedure :: improve
-      procedure :: choose_units
+      procedure :: begin
+      procedure :: cell_residual
+      procedure :: sum_residuals
    end type joint_system_type
 
    abstract interface
@@ -107,7 +109,27 @@ contains
       type(cell_vector_type), intent(inout) :: v
    end subroutine improve
 
-   !> Choose the units and the width of the second range for a contact from which the solution starts.
+   !> Begin with a contact: choose the units and the width of the second range, and make the first state. The caller has
+   !> set the grid and the rules, and sets the level of the state.
+   subroutine begin(self, touching, pressure, gap, traction, slope_x, slope_y, rms_slope, state)
+      class(joint_system_type), intent(inout) :: self
+      logical, intent(in) :: touching(:, :)
+      real(dp), intent(in) :: pressure(:, :), gap(:, :)       !! Pa, m
+      real(dp), intent(in) :: traction(:, :, :)               !! Pa
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)    !! of the road under the contact
+      real(dp), intent(in) :: rms_slope                       !! of the road
+      type(joint_state_type), intent(inout) :: state
+      integer :: c
+
+      call choose_units(self, touching, pressure, rms_slope)
+      self%width(:, :) = merge(self%rules%width, 0.0_dp, self%rules%has_jump(slope_x, slope_y))
+      state%s(:, :) = self%rules%number_of(self%width, touching, pressure, gap)
+      do c = 1, 2
+         state%t(:, c, :) = merge(traction(:, c, :), 0.0_dp, touching)
+      end do
+   end subroutine begin
+
+   !> Choose the units and the width of the second range.
    subroutine choose_units(self, touching, pressure, rms_slope)
       class(joint_system_type), intent(inout) :: self
       logical, intent(in) :: touching(:, :)
@@ -126,5 +148,48 @@ contains
          if (rules%law%jumps_at_edge()) rules%width = rules%soft_along*slope*rules%law%bare_strength()
       end associate
    end subroutine choose_units
+
+   !> Compute the residuals of a cell.
+   pure subroutine cell_residual(self, state, i, j, distance, pressure, slope, slip)
+      class(joint_system_type), intent(in) :: self
+      type(joint_state_type), intent(inout) :: state
+      integer, intent(in) :: i, j
+      real(dp), intent(in) :: distance                 !! U_z - H, m
+      real(dp), intent(in) :: pressure                 !! Pa
+      real(dp), intent(in) :: slope(2)                 !! of the road
+      real(dp), intent(in) :: slip(2)                  !! m
+      real(dp) :: share
+
+      state%residual(i, 1, j) = (distance - state%level - self%rules%gap_of(state%s(i, j)))/self%unit_length
+      share = self%rules%share_of(self%width(i, j), state%s(i, j))
+      state%residual(i, 2:3, j) = self%rules%traction_error(share, pressure, merge(slope, 0.0_dp, self%rules%law%slope_effect), &
+         slip, state%t(i, :, j))/self%unit_traction
+   end subroutine cell_residual
+
+   !> Sum the residuals of all cells, and compute that of the load: of the mean pressure, or of the level if it is given.
+   subroutine sum_residuals(self, state, pressure, target, level)
+      class(joint_system_type), intent(in) :: self
+      type(joint_state_type), intent(inout) :: state
+      real(dp), intent(in) :: pressure(:, :)           !! Pa
+      real(dp), intent(in) :: target                   !! mean pressure, Pa
+      real(dp), intent(in), optional :: level          !! m; it replaces the mean pressure
+      real(dp), allocatable :: rows(:, :), largest(:)
+      real(dp) :: sums(2)
+      integer :: j
+
+      allocate (rows(2, self%grid%rows()), largest(self%grid%rows()))
+      !$omp parallel do default(none) shared(self, state, pressure, rows, largest) private(j) &
+      !$omp num_threads(threads_for(pressure))
+      do j = 1, self%grid%rows()
+         rows(:, j) = [sum(state%residual(:, :, j)**2), sum(pressure(:, j))]
+         largest(j) = maxval(abs(state%residual(:, :, j)))
+      end do
+      sums = row_totals(rows)
+      state%load_residual = (sums(2)/self%grid%cells() - target)/self%unit_pressure
+      if (present(level)) state%load_residual = (state%level - level)/self%unit_length
+      state%worst = max(largest_of_rows(largest), abs(state%load_residual))
+      state%load_residual = state%load_residual*self%root
+      state%merit = sqrt(sums(1) + state%load_residual**2)
+   end subroutine sum_residuals
 
 end module joint_system

@@ -76,6 +76,7 @@ module normal_cg
       real(dp) :: coarse_start_from = 5e5_dp            !! cells from which a solve starts on a coarser grid
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
+      real(dp), allocatable, private :: step(:, :)    !! s, Pa [nx, rows]; first the trial pressure
    contains
       procedure :: solve
       procedure, private :: start_on_coarse_grid, solve_roughly
@@ -94,13 +95,11 @@ contains
 
       self%grid = grid
       if (present(mixed)) self%mixed = mixed
+      allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
       call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
       if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
          memory=self%operator%spectrum_memory())
-      if (allocated(error)) return
-      call new_normal_work(self%work, self%operator, error)
-      if (allocated(error)) return
-      allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
+      if (.not. allocated(error)) call new_normal_work(self%work, self%operator, error)
    end subroutine new_normal_solver
 
    !> Solve a contact problem by the fast method. It is recursive because the start may be a solution on a coarser grid.

@@ -41,8 +41,6 @@ contains
 
       self%grid = grid
       call new_convolution(self%operator, grid, kernel, error)
-      if (allocated(error)) return
-      allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
    end subroutine new_thesis_solver
 
    !> Solve a contact problem.

@@ -51,17 +51,13 @@ contains
 
       self%grid = operator%grid
       self%threads = operator%threads
+      allocate (self%direction(self%grid%nx, self%grid%rows()), source=0.0_sp)
+      allocate (self%state(self%grid%rows()))
       call new_coarse_level(self%coarse, self%grid, operator%kernel, error)
-      if (allocated(error)) return
-      call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, self%threads, error, &
-         memory=operator%spectrum_memory())
-      if (allocated(error)) return
-      associate (grid => self%grid)
-         allocate (self%direction(grid%nx, grid%rows()), source=0.0_sp)
-         call new_active_blocks(self%active, grid, self%coarse%first_y, self%coarse%strips, &
-            self%preconditioner%extends, self%threads)
-         allocate (self%state(grid%rows()))
-      end associate
+      if (.not. allocated(error)) call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, &
+         self%threads, operator%spectrum_memory(), error)
+      if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse%first_y, &
+         self%coarse%strips, self%preconditioner%extends, self%threads)
    end subroutine new_normal_work
 
    !> Find out which blocks have pressure, the least gap of each block, and the sums of the state.

@@ -26,7 +26,7 @@ module schur_blocks
 
    !> The numbers per block. A variable of this type must not be copied.
    type :: schur_blocks_type
-      type(schur_coarse_type), private :: model
+      type(schur_coarse_type) :: model            !! the coarse part of the model
       integer, private :: threads = 1
       real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
       real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
@@ -44,8 +44,6 @@ module schur_blocks
       procedure :: form_direction
       procedure :: response_parts
       procedure :: advance
-      procedure :: transforms
-      procedure :: destroy
    end type schur_blocks_type
 
 contains
@@ -197,20 +195,5 @@ contains
          self%pending(:, j) = length*self%addition(:, j)
       end do
    end subroutine advance
-
-   !> Transforms done so far, in units of a transform of the whole grid.
-   pure function transforms(self) result(count)
-      class(schur_blocks_type), intent(in) :: self
-      real(dp) :: count
-
-      count = self%model%transforms()
-   end function transforms
-
-   !> Free plans and memory.
-   subroutine destroy(self)
-      class(schur_blocks_type), intent(inout) :: self
-
-      call self%model%destroy()
-   end subroutine destroy
 
 end module schur_blocks

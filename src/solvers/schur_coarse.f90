@@ -80,13 +80,12 @@ contains
       self%threads = merge(1, threads, self%blocks < 16384.0_dp)
       allocate (self%weight(shape%nx, shape%rows()), source=0.0_dp)
       call new_symbol_operator(self%missing, shape, error, single=.true.)
+      if (.not. allocated(error)) call new_row_column(self%transform, shape, self%threads, error)
       if (allocated(error)) return
       modes = self%missing%modes()
       allocate (symbol(modes(1):modes(2), 0:shape%ny/2), self%model(modes(1):modes(2), 0:shape%ny/2))
       call model_symbols(grid, c0, h, modes(1), symbol, self%model)
       call self%missing%set_symbol(symbol)
-      call new_row_column(self%transform, shape, self%threads, error)
-      if (allocated(error)) return
       own = self%transform%own_columns()
       allocate (self%symbol(own(1):own(2), 0:shape%ny/2, 1), source=0.0_sp)
    end subroutine new_schur_coarse

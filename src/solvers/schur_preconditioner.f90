@@ -26,8 +26,8 @@
 !> the iterations. For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
-!> rim around the contact (the wide blocks of module `active_blocks`). Memory: four such fields, of which two may use
-!> memory that the caller lends.
+!> rim around the contact (the wide blocks of module `active_blocks`). Memory: four such fields, of which two lie in memory
+!> that the caller lends.
 module schur_preconditioner
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
    use active_blocks, only : active_blocks_type
@@ -59,7 +59,6 @@ module schur_preconditioner
       logical :: by_waves = .false.                      !! cells are so oblong that M r comes from `waves`
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
       type(wave_preconditioner_type) :: waves
-      logical, private :: owns = .false.                 !! this object frees the image and the response
    contains
       procedure :: set_residual
       procedure :: extend
@@ -69,16 +68,16 @@ module schur_preconditioner
 
 contains
 
-   !> Make the preconditioner of a grid. The image and the response may lie in `memory` for a field of
-   !> doubles, which others may use from the last use of a direction until `set_residual`.
-   subroutine new_schur_preconditioner(self, grid, coarse, threads, error, extends, memory)
+   !> Make the preconditioner of a grid. The image and the response lie in `memory` for a field of doubles, which others
+   !> may use from the last use of a direction until `set_residual`.
+   subroutine new_schur_preconditioner(self, grid, coarse, threads, memory, error, extends)
       type(schur_preconditioner_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
+      type(c_ptr), intent(in) :: memory
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: extends           !! chosen by the grid if absent
-      type(c_ptr), intent(in), optional :: memory
       real(sp), pointer, contiguous :: pair(:, :, :)
       real(dp) :: wx, wy, c0, aspect
 
@@ -96,14 +95,9 @@ contains
       self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
       allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
       allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
-      self%owns = .not. present(memory)
-      if (present(memory)) then
-         call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
-         self%image => pair(:, :, 1)
-         self%response => pair(:, :, 2)
-      else
-         allocate (self%image(grid%nx, grid%rows()), self%response(grid%nx, grid%rows()))
-      end if
+      call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
+      self%image => pair(:, :, 1)
+      self%response => pair(:, :, 2)
       call new_schur_blocks(self%blocks, grid, coarse, c0, threads, error)
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
@@ -182,18 +176,15 @@ contains
       class(schur_preconditioner_type), intent(in) :: self
       real(dp) :: count
 
-      count = self%blocks%transforms() + self%waves%transforms()
+      count = self%blocks%model%transforms() + self%waves%transforms()
    end function transforms
 
    !> Free plans and memory.
    subroutine destroy(self)
       class(schur_preconditioner_type), intent(inout) :: self
 
-      call self%blocks%destroy()
+      call self%blocks%model%destroy()
       call self%waves%destroy()
-      if (self%owns) deallocate (self%image, self%response)
-      self%owns = .false.
-      nullify (self%image, self%response)
    end subroutine destroy
 
 end module schur_preconditioner

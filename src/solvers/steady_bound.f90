@@ -48,7 +48,7 @@ contains
                traction(i, :, j) = 0.0_dp
                cycle
             end if
-            if (law%slope) slope = [slope_x(i, j), slope_y(i, j)]
+            if (law%slope_effect) slope = [slope_x(i, j), slope_y(i, j)]
             scale = unit_of(law, pressure(i, j))
             traction(i, :, j) = bounded(law, pressure(i, j), slope, scale*start(i, :, j) + c*slip(i, :, j))
          end do
@@ -96,7 +96,7 @@ contains
       traction = w
       if (s >= 1.0_dp) return
       steep = 0.0_dp
-      if (law%slope .and. law%physical_slip) steep = dot_product(slope, slope)
+      if (law%slope_effect .and. law%physical_slip) steep = dot_product(slope, slope)
       if (steep <= 0.0_dp) then
          traction = star + s*d
          return

@@ -29,7 +29,7 @@ module steady_contact
    !> The outcome of a solve with friction.
    type :: sliding_outcome_type
       type(solver_result_type) :: normal               !! iterations, error of the pressure
-      type(solver_result_type) :: rubbing              !! rounds, error of the traction
+      type(solver_result_type) :: tangential           !! rounds, error of the traction
    contains
       procedure :: converged
       procedure :: residual
@@ -42,7 +42,7 @@ contains
       class(sliding_outcome_type), intent(in) :: self
       logical :: yes
 
-      yes = self%normal%converged .and. self%rubbing%converged
+      yes = self%normal%converged .and. self%tangential%converged
    end function converged
 
    !> The larger one of the errors of the pressure and of the traction.
@@ -50,7 +50,7 @@ contains
       class(sliding_outcome_type), intent(in) :: self
       real(dp) :: error
 
-      error = max(self%normal%residual, self%rubbing%residual)
+      error = max(self%normal%residual, self%tangential%residual)
    end function residual
 
    !> Compute the road at x + u, where u is A_T T minus its mean over the contact, and the slip r.
@@ -121,12 +121,12 @@ contains
       if (law%jumps_at_edge()) then
          outcome%normal%reason = &
             'cells at the edge of the contact open and close in turn; try law = ''coulomb_orowan'''
-      else if (law%slope .and. law%strength_beside() < 0.0_dp) then
+      else if (law%slope_effect .and. law%strength_beside() < 0.0_dp) then
          if (field_count(contact%pressure > 0.0_dp .and. law%reach_coefficient()*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &
             outcome%normal%reason = 'the road wedges: slopes in contact exceed 1/coefficient'
       end if
-      outcome%rubbing%reason = outcome%normal%reason
+      outcome%tangential%reason = outcome%normal%reason
    end subroutine explain
 
 end module steady_contact

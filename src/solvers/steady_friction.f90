@@ -26,7 +26,7 @@
 !> the normal solver.
 module steady_friction
    use anderson, only : anderson_type, new_anderson
-   use field_sums, only : field_count, field_mean, field_sum, row_total
+   use field_sums, only : field_count, field_mean, field_sum, ratio_of_lengths, row_total
    use friction_law, only : friction_law_type
    use asperity_interpolation, only : displaced, interpolation_type, shifted
    use normal_state, only : normal_problem_type, prepare_problem, reason_iterations
@@ -38,7 +38,7 @@ module steady_friction
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
    use steady_contact, only : contact_mean, explain, sliding_outcome_type, steady_contact_type
    use steady_joint, only : steady_joint_type
-   use steady_judge, only : new_sliding, ratio_of_lengths, sliding_type
+   use steady_judge, only : new_sliding, sliding_type
    use steady_measure, only : steady_measure_type
    use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : steady_operator_type
@@ -105,11 +105,11 @@ contains
       if (outcome%normal%stopped) return
       pace%accepted = self%task%tolerance
       outcome%normal%reason = reason_iterations
-      outcome%rubbing%reason = reason_iterations
+      outcome%tangential%reason = reason_iterations
       do
          call round(self, pace, contact, measure, change)
          largest = max(change, measure%change/measure%size)
-         outcome%rubbing%iterations = outcome%rubbing%iterations + 1
+         outcome%tangential%iterations = outcome%tangential%iterations + 1
          outcome%normal%iterations = outcome%normal%iterations + pace%inner
          outcome%normal%stopped = stop_is_due()
          if (outcome%normal%stopped) return
@@ -119,20 +119,20 @@ contains
             if (outcome%converged()) exit
             pace%accepted = 0.5_dp*pace%accepted
          end if
-         if (outcome%rubbing%iterations >= self%task%max_iterations) then
+         if (outcome%tangential%iterations >= self%task%max_iterations) then
             call give_up(self, pace, contact, outcome)
             exit
          end if
 
-         if (outcome%rubbing%iterations >= doubtful .and. mod(outcome%rubbing%iterations, check_every) == 0) &
+         if (outcome%tangential%iterations >= doubtful .and. mod(outcome%tangential%iterations, check_every) == 0) &
             call keep_best(self, pace, contact)
-         call pace%choose_attempt(outcome%rubbing%iterations, largest, self%task%tolerance, self%grid%cells(), &
+         call pace%choose_attempt(outcome%tangential%iterations, largest, self%task%tolerance, self%grid%cells(), &
             self%law%jumps_at_edge())
          if (pace%attempt /= no_attempt) then
             call solve_at_once(self, pace, contact, outcome)
             if (outcome%normal%stopped .or. outcome%converged()) exit
          end if
-         call advance(self, pace, outcome%rubbing%iterations, largest, measure)
+         call advance(self, pace, outcome%tangential%iterations, largest, measure)
       end do
       outcome%normal%ffts = operator%ffts - before
    end subroutine solve
@@ -248,7 +248,7 @@ contains
       type(sliding_outcome_type), intent(inout) :: outcome
 
       outcome%normal%reason = reason_iterations
-      outcome%rubbing%reason = reason_iterations
+      outcome%tangential%reason = reason_iterations
       call complete(self, contact, outcome)
       call self%return_to_best(pace%best, contact, outcome)
       call explain(contact, self%law, outcome)

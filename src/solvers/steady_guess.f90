@@ -39,6 +39,7 @@ module steady_guess
       logical, allocatable :: inside(:, :)       !! C
       real(dp) :: level = 0.0_dp                 !! of U - H in C, m
       real(dp) :: spring = 0.0_dp                !! s, m/Pa
+      real(dp) :: soft = 0.0_dp                  !! displacement of a cell under its own unit pressure, m/Pa
       integer :: most_directions = 60            !! of GMRES
       type(contact_inverse_type), private :: inverse
       type(modal_inverse_type), private :: modal
@@ -52,7 +53,6 @@ module steady_guess
       procedure :: find_gap
       procedure :: correct
       procedure :: judge
-      procedure :: softness
    end type guess_type
 
 contains
@@ -79,6 +79,7 @@ contains
       guess%pressure(:, :) = pressure
       guess%inside(:, :) = pressure > 0.0_dp
       call guess%inverse%begin(operator)
+      guess%soft = guess%inverse%tiles%soft
       call guess%find_gap(operator, height)
       guess%level = field_mean(merge(guess%gap, 0.0_dp, guess%inside))*operator%grid%cells() &
          /max(field_count(guess%inside), 1.0_dp)
@@ -194,14 +195,6 @@ contains
       guess%chosen = other
       guess%since = 0
    end subroutine choose_inverse
-
-   !> The displacement of a cell under its own unit pressure, m/Pa.
-   pure function softness(guess) result(soft)
-      class(guess_type), intent(in) :: guess
-      real(dp) :: soft
-
-      soft = guess%inverse%softness()
-   end function softness
 
    !> Gather the values of a field in C.
    subroutine gather(guess, field, v)

@@ -30,14 +30,13 @@ module steady_inverse
       integer, allocatable, private :: number(:, :)    !! of each cell of the whole grid in the list; 0: open
       integer, allocatable, private :: cells(:, :)     !! the list, column and row of the grid [2, n]
       real(dp), allocatable, private :: lift(:, :)     !! pressures that displace the contact by 1 m, Pa [nx, rows]
-      type(contact_tiles_type), private :: tiles
+      type(contact_tiles_type) :: tiles                !! its `soft` is the displacement by a cell's own pressure
       type(contact_boxes_type), private :: boxes
    contains
       procedure :: make_room
       procedure :: begin
       procedure :: renew
       procedure :: solve
-      procedure :: softness
    end type contact_inverse_type
 
 contains
@@ -124,14 +123,6 @@ contains
          u(:, j) = u(:, j) + level*self%lift(:, j)
       end do
    end subroutine solve
-
-   !> The displacement of a cell under its own unit pressure, m/Pa.
-   pure function softness(self) result(soft)
-      class(contact_inverse_type), intent(in) :: self
-      real(dp) :: soft
-
-      soft = self%tiles%soft
-   end function softness
 
    !> Multiply by the inverse.
    subroutine invert(self, u)

@@ -12,7 +12,7 @@ module steady_joint
    use asperity_interpolation, only : interpolation_type
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
-   use field_sums, only : field_count, field_mean, field_sum, largest_of_rows, row_totals
+   use field_sums, only : field_count, field_mean, field_sum, ratio_of_lengths
    use friction_law, only : friction_law_type
    use gmres, only : cell_vector_type
    use joint_newton, only : joint_newton_type
@@ -87,7 +87,7 @@ contains
       logical :: solved
 
       outcome%normal%converged = .false.
-      outcome%rubbing%converged = .false.
+      outcome%tangential%converged = .false.
       if (.not. self%ready) call prepare(self, operator%grid)
       if (.not. self%ready) return
       associate (system => self%system)
@@ -230,21 +230,12 @@ contains
    subroutine start(system, begun)
       type(steady_system_type), intent(inout) :: system
       type(joint_state_type), intent(inout) :: begun
-      logical, allocatable :: touching(:, :)
-      real(dp) :: slope                                !! rms of the road
-      integer :: c
 
       associate (contact => system%contact, rules => system%rules)
-         touching = contact%pressure > 0.0_dp
          call find_softness(system%operator, rules%soft, rules%soft_along)
          call system%inverse%begin(system%operator)
-         slope = sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2))
-         call system%choose_units(touching, contact%pressure, slope)
-         system%width(:, :) = merge(rules%width, 0.0_dp, rules%has_jump(contact%slope_x, contact%slope_y))
-         begun%s(:, :) = rules%number_of(system%width, touching, contact%pressure, contact%gap)
-         do c = 1, 2
-            begun%t(:, c, :) = merge(contact%traction(:, c, :), 0.0_dp, touching)
-         end do
+         call system%begin(contact%pressure > 0.0_dp, contact%pressure, contact%gap, contact%traction, &
+            contact%slope_x, contact%slope_y, sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2)), begun)
          begun%level = contact%level
       end associate
    end subroutine start
@@ -289,32 +280,18 @@ contains
       type(steady_system_type), intent(in) :: self
       type(steady_contact_type), intent(in) :: contact      !! its gap holds U_z
       type(joint_state_type), intent(inout) :: state
-      real(dp), allocatable :: rows(:, :), largest(:)
-      real(dp) :: sums(2), share, slope(2), stretch
+      real(dp) :: stretch
       integer :: i, j
 
-      allocate (rows(2, self%grid%rows()), largest(self%grid%rows()))
       stretch = self%c*self%rules%soft_along           ! converts r to a length: T + c_t r is returned to the bound
-      slope = 0.0_dp
-      !$omp parallel do default(none) shared(self, contact, state, rows, largest, stretch) &
-      !$omp private(i, j, share) firstprivate(slope)
+      !$omp parallel do default(none) shared(self, contact, state, stretch) private(i, j)
       do j = 1, self%grid%rows()
          do i = 1, self%grid%nx
-            if (self%rules%law%slope) slope = [contact%slope_x(i, j), contact%slope_y(i, j)]
-            share = self%rules%share_of(self%width(i, j), state%s(i, j))
-            state%residual(i, 1, j) = (contact%gap(i, j) - contact%height(i, j) - state%level &
-               - self%rules%gap_of(state%s(i, j)))/self%unit_length
-            state%residual(i, 2:3, j) = self%rules%traction_error(share, contact%pressure(i, j), slope, &
-               stretch*contact%slip(i, :, j), state%t(i, :, j))/self%unit_traction
+            call self%cell_residual(state, i, j, contact%gap(i, j) - contact%height(i, j), contact%pressure(i, j), &
+               [contact%slope_x(i, j), contact%slope_y(i, j)], stretch*contact%slip(i, :, j))
          end do
-         rows(:, j) = [sum(state%residual(:, :, j)**2), sum(contact%pressure(:, j))]
-         largest(j) = maxval(abs(state%residual(:, :, j)))
       end do
-      sums = row_totals(rows)
-      state%load_residual = (sums(2)/self%grid%cells() - self%target)/self%unit_pressure
-      state%worst = max(largest_of_rows(largest), abs(state%load_residual))
-      state%load_residual = state%load_residual*self%root
-      state%merit = sqrt(sums(1) + state%load_residual**2)
+      call self%sum_residuals(state, contact%pressure, self%target)
    end subroutine compare
 
    !> Prepare the approximate inverse for the cells that carry pressure in a state.
@@ -358,24 +335,22 @@ contains
       type(normal_problem_type), intent(in) :: task
       type(sliding_outcome_type), intent(inout) :: outcome
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(2)
       integer :: j
 
       call system%evaluate(found)
-      associate (contact => system%contact, rules => system%rules, rubbing => outcome%rubbing)
+      associate (contact => system%contact, rules => system%rules, tangential => outcome%tangential)
          call judge_gap(contact, system%operator, task, outcome%normal)
          allocate (rows(2, system%grid%rows()))
          do j = 1, system%grid%rows()
             rows(1, j) = sum((found%residual(:, 2:3, j)*system%unit_traction)**2)
             rows(2, j) = sum(contact%traction(:, :, j)**2)
          end do
-         sums = row_totals(rows)
-         rubbing%residual = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
-         rubbing%converged = rubbing%residual <= task%tolerance
+         tangential%residual = ratio_of_lengths(rows)
+         tangential%converged = tangential%residual <= task%tolerance
          ! On slopes above 1/mu the third state replaces the jump from stick to open, which is not part of any law.
-         if (.not. rules%law%jumps_at_edge()) rubbing%converged = rubbing%converged .and. &
+         if (.not. rules%law%jumps_at_edge()) tangential%converged = tangential%converged .and. &
             .not. field_count(found%s >= 0.0_dp .and. found%s < system%width) > 0.0_dp
-         if (rubbing%converged) rubbing%reason = reason_converged
+         if (tangential%converged) tangential%reason = reason_converged
       end associate
    end subroutine return_solution
 

@@ -7,7 +7,7 @@
 module steady_judge
    use asperity_interpolation, only : interpolation_type
    use asperity_precision, only : dp
-   use field_sums, only : row_totals
+   use field_sums, only : ratio_of_lengths
    use friction_law, only : friction_law_type
    use normal_state, only : normal_problem_type, reason_converged
    use regular_grid, only : grid_type
@@ -17,7 +17,7 @@ module steady_judge
    implicit none
    private
 
-   public :: new_sliding, ratio_of_lengths, sliding_type
+   public :: new_sliding, sliding_type
 
    !> The problem of sliding, the last ratio of the traction to its unit, and the best contact.
    type :: sliding_type
@@ -85,9 +85,9 @@ contains
          rows(1, j) = sum((again(:, :, j) - contact%traction(:, :, j))**2)
          rows(2, j) = sum(contact%traction(:, :, j)**2)
       end do
-      outcome%rubbing%residual = ratio_of_lengths(rows)
-      outcome%rubbing%converged = outcome%rubbing%residual <= self%task%tolerance
-      if (outcome%rubbing%converged) outcome%rubbing%reason = reason_converged
+      outcome%tangential%residual = ratio_of_lengths(rows)
+      outcome%tangential%converged = outcome%tangential%residual <= self%task%tolerance
+      if (outcome%tangential%converged) outcome%tangential%reason = reason_converged
    end subroutine judge
 
    !> Keep a contact if it is the best so far.
@@ -116,15 +116,5 @@ contains
       contact%traction(:, :, :) = self%best(:, 2:3, :)
       call self%judge(contact, outcome)
    end subroutine return_to_best
-
-   !> The length of one field over that of another, from the squares of both in each row.
-   function ratio_of_lengths(rows) result(ratio)
-      real(dp), intent(in) :: rows(:, :)             !! [2, rows of this process]
-      real(dp) :: ratio
-      real(dp) :: sums(2)
-
-      sums = row_totals(rows)
-      ratio = sqrt(sums(1)/max(sums(2), tiny(1.0_dp)))
-   end function ratio_of_lengths
 
 end module steady_judge

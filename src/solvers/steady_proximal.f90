@@ -144,11 +144,10 @@ contains
       type(guess_type), intent(inout) :: guess
       type(gap_measure_type), intent(in) :: found
       real(dp), intent(in) :: cells              !! of the grid
-      real(dp) :: contact_pressure, soft
+      real(dp) :: contact_pressure
 
-      soft = guess%softness()
       contact_pressure = field_mean(guess%pressure)*cells/field_count(guess%inside)
-      guess%spring = min(max(found%duality_gap/contact_pressure, stiffest*soft), softest*soft)
+      guess%spring = min(max(found%duality_gap/contact_pressure, stiffest*guess%soft), softest*guess%soft)
    end subroutine first_spring
 
    !> Find the cells in contact and the pressure with the present springs.
@@ -222,7 +221,7 @@ contains
          if (step%rounds <= 4) step%careful = .false.
          if (.not. step%careful) guess%spring = guess%spring*step%factor
       else if (step%outcome == diverged .or. .not. step%solved) then
-         guess%spring = min(guess%spring/step%factor, softest*guess%softness())
+         guess%spring = min(guess%spring/step%factor, softest*guess%soft)
          step%careful = .true.
       end if
       step%rounds = 0

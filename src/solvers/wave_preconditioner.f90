@@ -63,7 +63,6 @@ contains
       real(dp), allocatable :: symbol(:, :)
       integer :: modes(2)
 
-      if (allocated(error)) return
       self%grid = grid
       allocate (self%inside(coarse%nx, coarse%strips(1):coarse%strips(2)), source=0.0_dp)
       allocate (self%level(coarse%nx, coarse%strips(1):coarse%strips(2)), source=0.0_dp)
