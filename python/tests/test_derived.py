@@ -22,7 +22,7 @@ from asperity.results.settings import (
     steady_phases,
 )
 from asperity.runs import namelists
-from asperity.views.report import settings_groups
+from asperity.views.report_sections import settings_groups
 
 
 def with_text(path, name, text):
