@@ -45,18 +45,18 @@ module tangential_step
       logical, private :: foresees = .true.           !! `slip` serves as a forecast, except with the thesis's method
       logical, private :: slip_expected = .false.     !! `slip` is about that of the step
       logical :: pulled(2) = .false.                  !! the road is pulled by a force along x, y
-      type(road_pull_type) :: road_pull                    !! that force, and the motion that follows from it
+      type(road_pull_type) :: road_pull               !! that force, and the motion that follows from it
       !> The share of its bound that each cell may carry [nx, rows]. If it is not allocated, cells in contact carry the
       !> whole bound.
       real(dp), allocatable :: share(:, :)
       type(convolution_type), private :: operator
       type(friction_solver_type), private :: solver
-      real(dp), allocatable, private :: drive(:, :, :)    !! DX'
-      real(dp), allocatable, private :: past(:, :, :)     !! T_h
+      real(dp), allocatable, private :: drive(:, :, :)    !! DX' [nx, 2, rows]
+      real(dp), allocatable, private :: past(:, :, :)     !! T_h, Pa [nx, 2, rows]
       real(dp), private :: motion(2) = 0.0_dp             !! D' - D of the present step, m; a guess where pulled
-      real(dp), private :: dt = 0.0_dp
-      real(dp), private :: q = 0.0_dp
-      real(dp), private :: past_mean(2) = 0.0_dp
+      real(dp), private :: dt = 0.0_dp                    !! of the present step, s; 0: instantaneous
+      real(dp), private :: q = 0.0_dp                     !! Q of the present step, Pa
+      real(dp), private :: past_mean(2) = 0.0_dp          !! mean of T_h, Pa
       real(dp), private :: compliance = 0.0_dp            !! of a cell under its own unit traction, G = 1, m/Pa
    contains
       procedure :: begin
@@ -94,7 +94,7 @@ contains
       call new_friction_solver(self%solver, self%grid, self%operator, error, trim(case%solver%method))
       self%solver%max_iterations = case%solver%max_iterations
       self%solver%accepted = case%solver%tolerance
-      ! The passes judge by the displacements whether a step is solved.
+      ! The traction need not settle as well, because the passes judge a step by its displacements.
       self%solver%settle = .false.
       self%foresees = case%solver%method /= 'thesis'
       allocate (self%trial(self%grid%nx, 2, self%grid%rows()), source=0.0_dp)

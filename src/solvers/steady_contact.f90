@@ -108,7 +108,7 @@ contains
       mean = sums(1:2)/max(sums(3), tiny(1.0_dp))
    end function contact_mean
 
-   !> Say why there may be no solution. On a slope of angle alpha the law allows T = P tan(atan(mu) + alpha) uphill,
+   !> Give the reason why there may be no solution. On a slope of angle alpha the law allows T = P tan(atan(mu) + alpha) uphill,
    !> which has no bound if mu tan(alpha) reaches 1: the road wedges. If the law has a strength, it bounds the traction,
    !> and a solution exists. With constant shear the solver may not find it, because the traction jumps at the edge of
    !> the contact.

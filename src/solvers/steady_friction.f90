@@ -240,7 +240,7 @@ contains
       call self%keep(outcome%residual(), contact, pace%best)
    end subroutine keep_best
 
-   !> End the rounds after the largest number, with the best contact, and say why there may be no solution.
+   !> End the rounds after the largest number, with the best contact and the reason why there may be no solution.
    subroutine give_up(self, pace, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
       type(pace_type), intent(in) :: pace

@@ -28,8 +28,8 @@ module steady_guess
    public :: guess_type
 
    integer, parameter :: tiles = 1, modes = 2    !! the approximate inverses
-   integer, parameter :: trust = 8               !! solutions after which the other inverse is tried again
-   real(dp), parameter :: dear = 60.0_dp         !! transforms per decade that call for the other inverse
+   integer, parameter :: retry_after = 8         !! solutions after which the other inverse is tried again
+   real(dp), parameter :: too_costly = 60.0_dp   !! transforms per decade that call for the other inverse
 
    !> A contact that is being solved.
    type :: guess_type
@@ -44,7 +44,7 @@ module steady_guess
       type(contact_inverse_type), private :: inverse
       type(modal_inverse_type), private :: modal
       integer, private :: chosen = tiles         !! the inverse in use
-      real(dp), private :: price(2) = 0.0_dp     !! transforms per decade of either inverse when it was last used; 0: never
+      real(dp), private :: cost(2) = 0.0_dp     !! transforms per decade of either inverse when it was last used; 0: never
       integer, private :: since = 0              !! solutions with the inverse in use
       real(dp), allocatable, private :: work(:, :), moved(:, :)
       integer, allocatable, private :: first(:)  !! [rows + 1] the first cell of each row in the list of C
@@ -178,7 +178,7 @@ contains
       end if
    end subroutine invert
 
-   !> Choose the inverse for the next solution by what either has taken.
+   !> Choose the inverse for the next solution by the transforms that each has taken.
    subroutine choose_inverse(guess, transforms, left)
       type(guess_type), intent(inout) :: guess
       real(dp), intent(in) :: transforms         !! of a solution with the present inverse
@@ -186,12 +186,12 @@ contains
       integer :: other
 
       if (.not. (left > 0.0_dp .and. left < 1.0_dp)) return
-      guess%price(guess%chosen) = transforms/log10(1.0_dp/left)
+      guess%cost(guess%chosen) = transforms/log10(1.0_dp/left)
       guess%since = guess%since + 1
       other = modes + tiles - guess%chosen
-      if (guess%price(guess%chosen) < dear) return
-      if (guess%since < trust .and. guess%price(other) > 0.0_dp &
-         .and. guess%price(other) > guess%price(guess%chosen)) return
+      if (guess%cost(guess%chosen) < too_costly) return
+      if (guess%since < retry_after .and. guess%cost(other) > 0.0_dp &
+         .and. guess%cost(other) > guess%cost(guess%chosen)) return
       guess%chosen = other
       guess%since = 0
    end subroutine choose_inverse
