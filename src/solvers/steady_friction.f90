@@ -36,13 +36,13 @@ module steady_friction
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    use steady_bound, only : bound_tractions, compare_tractions, largest_force
-   use steady_contact, only : contact_mean, explain, sliding_outcome_type, steady_contact_type
+   use steady_contact, only : contact_mean, explain, read_road, sliding_outcome_type, steady_contact_type
    use steady_joint, only : steady_joint_type
    use steady_judge, only : new_sliding, sliding_type
    use steady_measure, only : steady_measure_type
    use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : steady_operator_type
-   use steady_start, only : contact_without_friction, full_sliding, ratio_of_sliding
+   use steady_start, only : contact_without_friction, ratio_of_sliding
    use steady_pace, only : along_path, along_second_path, components, from_here, no_attempt, pace_type
    implicit none
    private
@@ -149,19 +149,16 @@ contains
       if (self%task%warm) then
          call self%normal%start(self%operator, self%task, contact%height, contact%pressure, contact%gap)
          call self%operator%shear(contact%traction, contact%displacement, contact%slip)
-         contact%offset = contact_mean(contact)
-         call displaced(self%road, self%base(1) + contact%offset(1), self%base(2) + contact%offset(2), &
-            contact%displacement(:, 1, :), contact%displacement(:, 2, :), contact%height, &
-            contact%slope_x, contact%slope_y)
+         call read_road(contact, self%road, self%base, self%direction)
          call compare_tractions(self%law, contact%pressure, contact%traction, self%ratio)
       else
-         call contact_without_friction(self%normal, self%operator, self%task, contact, normal)
+         call contact_without_friction(self%normal, self%operator, self%task, self%direction, contact, normal)
          if (normal%stopped) return
       end if
       self%state(:, 1, :) = self%normal%z
       do c = 1, 2
          self%state(:, 1 + c, :) = contact%displacement(:, c, :) - contact%offset(c)
-         self%state(:, 3 + c, :) = self%direction(c) + contact%slip(:, c, :)
+         self%state(:, 3 + c, :) = contact%slip(:, c, :)
       end do
       self%c = scale_of_slip*largest_force(self%law, field_sum(contact%pressure) &
          /max(field_count(contact%pressure > 0.0_dp), 1.0_dp))
@@ -271,10 +268,12 @@ contains
       if (pace%attempt /= from_here) call self%return_to_best(pace%best, contact, outcome)
       if (pace%attempt == along_path .or. pace%attempt == along_second_path) then
          call shifted(self%road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
-         call contact_without_friction(self%normal, self%operator, self%task, contact, start)
+         call contact_without_friction(self%normal, self%operator, self%task, self%direction, contact, start)
          outcome%normal%stopped = start%stopped
          if (outcome%normal%stopped) return
-         call full_sliding(self%law, self%c, self%direction, self%ratio, contact)
+         call ratio_of_sliding(self%law, self%direction, self%ratio)
+         call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, self%ratio, &
+            contact%slip, contact%traction)
       end if
       self%joint%direction = self%direction
       self%joint%base = self%base
