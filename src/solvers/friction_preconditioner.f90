@@ -104,11 +104,7 @@ contains
       call mean_mode(problem, inverse, coupling)
       uniform%traction = matmul(inverse, problem%sums%residual)
       uniform%displacement = matmul(coupling, uniform%traction)
-      if (bounds_outweigh(problem)) then
-         call divide_rows(self, problem, uniform, rows)
-      else
-         call precondition_rows(self, problem, uniform, rows)
-      end if
+      call precondition_rows(self, problem, uniform, .not. bounds_outweigh(problem), rows)
       sums = total_of(rows)
       self%cross = sums%cross
       self%shift = uniform%traction &
@@ -126,49 +122,36 @@ contains
       yes = problem%slipping == problem%cells .and. weights < light*problem%cells
    end function bounds_outweigh
 
-   !> Compute the rows of z with 1/a_0 in place of M, without transforms: z = w/a_0 Z (g - H e c).
-   subroutine divide_rows(self, problem, uniform, rows)
+   !> Compute the rows of z with M, or without transforms with 1/a_0 in place of M: z = w/a_0 Z (g - H e c).
+   subroutine precondition_rows(self, problem, uniform, with_inverse, rows)
       type(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
       type(uniform_type), intent(in) :: uniform
+      logical, intent(in) :: with_inverse          !! with M
       type(z_sums_type), intent(inout) :: rows(:)
       real(dp) :: g(problem%nx, 2)
       integer :: j
 
-      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j, g) &
+      !$omp parallel do default(none) shared(self, problem, uniform, with_inverse, rows) private(j, g) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
          call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%z(:, :, j), g, rows(j)%cross)
-         self%z(:, :, j) = g/problem%compliance
-         call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
-            problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
+         if (with_inverse) then
+            call self%inverse%forward_row(1, j, g(:, 1))
+            call self%inverse%forward_row(2, j, g(:, 2))
+         else
+            self%z(:, :, j) = g/problem%compliance
+         end if
       end do
-   end subroutine divide_rows
-
-   !> Compute the rows of z with M.
-   subroutine precondition_rows(self, problem, uniform, rows)
-      type(friction_preconditioner_type), intent(inout) :: self
-      type(friction_problem_type), intent(in) :: problem
-      type(uniform_type), intent(in) :: uniform
-      type(z_sums_type), intent(inout) :: rows(:)
-      real(dp) :: g(problem%nx, 2)
-      integer :: j
-
-      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j, g) &
+      if (with_inverse) call self%inverse%columns(columns_apply)
+      !$omp parallel do default(none) shared(self, problem, uniform, with_inverse, rows) private(j) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
-            problem%work%tangent(:, :, j), self%z(:, :, j), g, rows(j)%cross)
-         call self%inverse%forward_row(1, j, g(:, 1))
-         call self%inverse%forward_row(2, j, g(:, 2))
-      end do
-      call self%inverse%columns(columns_apply)
-      !$omp parallel do default(none) shared(self, problem, uniform, rows) private(j) &
-      !$omp num_threads(problem%threads)
-      do j = 1, problem%rows
-         call self%inverse%backward_row(1, j, self%z(:, 1, j))
-         call self%inverse%backward_row(2, j, self%z(:, 2, j))
+         if (with_inverse) then
+            call self%inverse%backward_row(1, j, self%z(:, 1, j))
+            call self%inverse%backward_row(2, j, self%z(:, 2, j))
+         end if
          call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
       end do
