@@ -34,7 +34,7 @@ contains
       row%displacement = 1.0_dp
       row%road_x = 2.0_dp
       row%work_normal = 2.5_dp
-      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .true., row)
+      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .false., .true., row)
       call check_close(row%work_load, 13.0_dp, 1e-14_dp, 'work of the load')
       call check_close(row%work_drive, 3.0_dp, 1e-14_dp, 'work of the drive')
       ! 3 + 3 - 2.5 = 3.5 is above (2*1 + 1*2)/2 = 2.
@@ -42,15 +42,19 @@ contains
       call check_close(row%work_missing, 0.0_dp, 0.0_dp, 'all of it is radiated')
       row%work_normal = 4.5_dp
       row%energy_radiated = 0.0_dp
-      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .true., row)
+      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .false., .true., row)
       call check_close(row%work_missing, 1.5_dp, 1e-14_dp, 'what a path can explain is missing')
       call check_close(row%energy_radiated, 0.0_dp, 0.0_dp, 'and not radiated')
       row%work_normal = 2.5_dp
-      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .false., row)
+      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .false., .false., row)
       call check_close(row%work_missing, 3.5_dp, 1e-14_dp, 'without adhesion nothing is radiated')
       row%work_missing = 0.0_dp
-      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .true., .true., row)
+      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .true., .false., .true., row)
       call check_close(row%work_load, 12.5_dp, 1e-14_dp, 'a jump works what it stores')
+      row%work_load = 10.0_dp
+      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .true., .false., row)
+      call check_close(row%work_drive, 2.5_dp - 3.0_dp, 1e-14_dp, 'the first step of a motion: drive')
+      call check_close(row%work_missing, 0.0_dp, 0.0_dp, 'the first step of a motion: balance')
    end subroutine excess_and_radiation_of_one_row
 
    !> Mindlin's sphere moved back and forth, nu = 0. The energy lost in a loop is the area of the exact loop

@@ -50,6 +50,8 @@ module friction_law
    contains
       procedure :: normal_traction
       procedure :: bound_ratio
+      procedure :: friction_force
+      procedure :: ratio_under
       procedure :: bound_variation
       procedure :: bound_row
       procedure :: reach_coefficient
@@ -102,23 +104,43 @@ contains
       real(dp), intent(in) :: d(2)          !! D = T - T*, Pa
       real(dp), intent(in), optional :: share(2)     !! of the bound, see module `shear_law`; 1 if absent
       real(dp) :: s                         !! >= 0; `unbounded` where the ray meets no bound
-      real(dp) :: root, nd, m, force, part(2)
+      real(dp) :: part(2)
 
       part = 1.0_dp
       if (present(share)) part = share
-      if (self%slope_effect) then
-         root = sqrt(1.0_dp + slope(1)**2 + slope(2)**2)       ! 1/N_z
-         nd = -(slope(1)*d(1) + slope(2)*d(2))/root
-         m = sqrt(max(d(1)**2 + d(2)**2 - nd**2, 0.0_dp))
-      else
-         root = 1.0_dp
-         nd = 0.0_dp
-         m = sqrt(d(1)**2 + d(2)**2)
-      end if
-      force = self%shear%force(max(p*root + self%adhesive_pressure/root, 0.0_dp), part)
-      s = ratio(force, m - self%shear%coefficient*part(1)*nd)
-      if (self%shear%strength_beside >= 0.0_dp) s = min(s, ratio(self%shear%strength_beside*part(2), m))
+      s = self%ratio_under(self%friction_force(p, slope, part), slope, d, part)
    end function bound_ratio
+
+   !> F, the force of the law under a pressure.
+   pure function friction_force(self, p, slope, share) result(force)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: p             !! pressure, Pa
+      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not used by a law without slope
+      real(dp), intent(in) :: share(2)      !! of the bound, see module `shear_law`
+      real(dp) :: force                     !! Pa
+      real(dp) :: root
+
+      root = 1.0_dp
+      if (self%slope_effect) root = sqrt(1.0_dp + slope(1)**2 + slope(2)**2)       ! 1/N_z
+      force = self%shear%force(max(p*root + self%adhesive_pressure/root, 0.0_dp), share)
+   end function friction_force
+
+   !> The s for which T* + s D lies on the bound under a given force F.
+   pure function ratio_under(self, force, slope, d, share) result(s)
+      class(friction_law_type), intent(in) :: self
+      real(dp), intent(in) :: force         !! F, Pa
+      real(dp), intent(in) :: slope(2)      !! H_x, H_y; not used by a law without slope
+      real(dp), intent(in) :: d(2)          !! D = T - T*, Pa
+      real(dp), intent(in) :: share(2)      !! of the bound, see module `shear_law`
+      real(dp) :: s                         !! >= 0; `unbounded` where the ray meets no bound
+      real(dp) :: nd, m
+
+      nd = 0.0_dp
+      if (self%slope_effect) nd = -(slope(1)*d(1) + slope(2)*d(2))/sqrt(1.0_dp + slope(1)**2 + slope(2)**2)
+      m = sqrt(max(d(1)**2 + d(2)**2 - nd**2, 0.0_dp))
+      s = ratio(force, m - self%shear%coefficient*share(1)*nd)
+      if (self%shear%strength_beside >= 0.0_dp) s = min(s, ratio(self%shear%strength_beside*share(2), m))
+   end function ratio_under
 
    !> The bound of a row of cells for loops that must not branch: s = F/(m - mu n.D), or the smaller of
    !> that and strength/m, with F of each cell, mu from `reach_coefficient` and the strength from

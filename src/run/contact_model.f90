@@ -183,7 +183,7 @@ contains
       call add_rows(products, sums)
       call book_step(self%state%books, self%material, products)
       if (self%frictional) call self%tangential%commit(self%state%tangential, self%material, &
-         self%state%pressure, self%slope_x, self%slope_y)
+         self%state%pressure, self%state%gap, self%slope_x, self%slope_y)
       call finish_step(self%material)
       self%state%dt_old = self%material%dt_old
    end subroutine commit_step

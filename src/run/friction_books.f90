@@ -1,78 +1,136 @@
 !> The energy that is lost by friction in a step, and the mean motion of the surface in the contact.
 !>
-!> The loss of a cell is the mean traction over the step times the slip, which is of second order in the length of
-!> the step.
+!> The loss of a cell is the integral of its frictional traction d = T - T* along its slip r. A step knows d at both
+!> ends only, and a cell need not slip during the whole step. Let e be the direction of r, t and t' the components of d
+!> along e at both ends, and b the value that t would have on the bound of the start. As long as the cell sticks, its
+!> traction is assumed to grow linearly, so that it would reach t' + |r|/a at the end of the step, while the bound
+!> changes linearly from b to t'. (a is the displacement of the contact under a unit traction: that of a cell times the
+!> root of the number of cells.) The slip begins where they meet, after the part s of the step:
+!>
+!>    s = (b - t)/(b - t + |r|/a),   onset = b + s (t' - b),   loss = (onset + t')/2 |r|
+!>
+!> A cell that slips from the start on has b = t, so that s = 0, and the mean of both ends counts; this is of second
+!> order in the length of the step. A cell that enters or leaves the contact has no bound at one end. On a steep slope b
+!> may be infinite; b is therefore at most max(t, 2 t').
+!>
+!> All of this is continuous in the tractions and the slip. Whether a cell was marked as sticking or slipping does not
+!> count, because this is round-off where the traction lies on its bound and the slip vanishes, for example when the
+!> road has stopped.
 module friction_books
    use asperity_precision, only : dp
-   use field_sums, only : row_totals
-   use friction_law, only : contact_open, contact_stick, friction_law_type
+   use contact_rule, only : touches
+   use field_sums, only : field_count, row_totals
+   use friction_fields, only : friction_fields_type
+   use friction_law, only : contact_open, contact_stick, friction_law_type, unbounded
    use tangential_state, only : tangential_state_type
    implicit none
    private
 
-   public :: book_friction, rubbed_type
+   public :: book_friction, book_rest, rubbed_type
 
    !> Sums over the cells.
    type :: rubbed_type
       real(dp) :: loss = 0.0_dp                       !! J/m2
-      real(dp) :: motion(2) = 0.0_dp                 !! motion of the surface in the contact, m
+      real(dp) :: motion(2) = 0.0_dp                  !! motion of the surface in the contact, m
       real(dp) :: cells = 0.0_dp                      !! number of cells in contact
    end type rubbed_type
 
 contains
 
-   !> Form the sums of a step. The state keeps the frictional tractions for the next step.
-   subroutine book_friction(state, law, trial, slip, pressure, slope_x, slope_y, rubbed)
+   !> Form the sums of a step. The state keeps the frictional tractions and the forces of the law for the next step.
+   subroutine book_friction(state, law, compliance, fields, trial, rubbed)
       type(tangential_state_type), intent(inout) :: state   !! displacement: at the start of the step
       type(friction_law_type), intent(in) :: law
+      real(dp), intent(in) :: compliance              !! of a cell, m/Pa; 0 if there is only one
+      type(friction_fields_type), intent(in) :: fields   !! pressure, shares, slopes and slip of the step
       real(dp), intent(in) :: trial(:, :, :)          !! [nx, 2, rows] displacement at the end, m
-      real(dp), intent(in) :: slip(:, :, :)           !! [nx, 2, rows] m
-      real(dp), intent(in) :: pressure(:, :)          !! [nx, rows] Pa
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
       type(rubbed_type), intent(out) :: rubbed
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: rubbing(2), slope(2), total(4)
+      real(dp) :: a, force, rubbing(2), share(2), slope(2), total(4)
       integer :: i, j
 
-      allocate (rows(4, size(pressure, 2)), source=0.0_dp)
+      allocate (rows(4, size(trial, 3)), source=0.0_dp)
       slope = 0.0_dp
-      !$omp parallel do default(none) shared(state, law, trial, slip, pressure, slope_x, slope_y, rows) &
-      !$omp private(i, j, rubbing) firstprivate(slope)
-      do j = 1, size(pressure, 2)
-         do i = 1, size(pressure, 1)
+      share = 1.0_dp
+      a = compliance*sqrt(field_count(state%contact /= contact_open))
+      !$omp parallel do default(none) shared(state, law, a, fields, trial, rows) &
+      !$omp private(i, j, force, rubbing) firstprivate(share, slope)
+      do j = 1, size(trial, 3)
+         do i = 1, size(trial, 1)
             rubbing = 0.0_dp
+            force = 0.0_dp
+            if (law%slope_effect) slope = [fields%slope_x(i, j), fields%slope_y(i, j)]
             if (state%contact(i, j) /= contact_open) then
-               if (law%slope_effect) slope = [slope_x(i, j), slope_y(i, j)]
-               rubbing = state%traction(i, :, j) - law%normal_traction(pressure(i, j), slope)
+               rubbing = state%traction(i, :, j) - law%normal_traction(fields%pressure(i, j), slope)
+               if (associated(fields%share)) share = [1.0_dp, fields%share(i, j)]
+               force = law%friction_force(fields%pressure(i, j), slope, share)
                rows(2:3, j) = rows(2:3, j) + trial(i, :, j) - state%displacement(i, :, j)
                rows(4, j) = rows(4, j) + 1.0_dp
             end if
             ! The slip of a point that sticks is an error within the tolerance of the solver, and causes no loss.
-            if (state%contact(i, j) /= contact_stick) rows(1, j) = rows(1, j) + friction_loss( &
-               state%rubbed(i, j) == contact_stick, state%rubbing(i, :, j), rubbing, slip(i, :, j))
+            if (state%contact(i, j) /= contact_stick) rows(1, j) = rows(1, j) + friction_loss(law, a, slope, &
+               state%force(i, j), state%rubbing(i, :, j), rubbing, fields%slip(i, :, j))
             state%rubbing(i, :, j) = rubbing
-            state%rubbed(i, j) = state%contact(i, j)
+            state%force(i, j) = force
          end do
       end do
       total = row_totals(rows)
       rubbed = rubbed_type(total(1), total(2:3), total(4))
    end subroutine book_friction
 
-   !> The loss of a cell by friction in a step, J/m2: the mean of the frictional tractions at both ends of the step times
-   !> the slip. A cell that enters or leaves the contact has no traction at one end. A cell that stuck at the start slips
-   !> only after its traction has reached the bound, so that only the traction at the end counts. The same holds if
-   !> the slip is opposed to the traction of the start, because the cell must have stuck in between.
-   pure function friction_loss(stuck, before, after, slip) result(loss)
-      logical, intent(in) :: stuck                    !! at the start of the step
+   !> Note the forces of the law in a contact without friction, because the road has not moved yet.
+   subroutine book_rest(state, law, adhesive, pressure, gap, slope_x, slope_y)
+      type(tangential_state_type), intent(inout) :: state
+      type(friction_law_type), intent(in) :: law
+      logical, intent(in) :: adhesive                 !! the contact has an adhesive potential
+      real(dp), intent(in) :: pressure(:, :)          !! [nx, rows] Pa
+      real(dp), intent(in) :: gap(:, :)               !! m
+      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(state, law, adhesive, pressure, gap, slope_x, slope_y) private(i, j)
+      do j = 1, size(pressure, 2)
+         do i = 1, size(pressure, 1)
+            state%force(i, j) = 0.0_dp
+            if (touches(adhesive, pressure(i, j), gap(i, j))) state%force(i, j) = &
+               law%friction_force(pressure(i, j), [slope_x(i, j), slope_y(i, j)], [1.0_dp, 1.0_dp])
+         end do
+      end do
+   end subroutine book_rest
+
+   !> The loss of a cell by friction in a step, J/m2.
+   pure function friction_loss(law, compliance, slope, force, before, after, slip) result(loss)
+      type(friction_law_type), intent(in) :: law
+      real(dp), intent(in) :: compliance              !! a, m/Pa
+      real(dp), intent(in) :: slope(2)                !! of the road at the end of the step
+      real(dp), intent(in) :: force                   !! of the law at the start of the step, Pa; 0 if it was open
       real(dp), intent(in) :: before(2)               !! T - T* at the start of the step, Pa
       real(dp), intent(in) :: after(2)                !! and at its end, Pa
       real(dp), intent(in) :: slip(2)                 !! m
       real(dp) :: loss
-      real(dp) :: first
+      real(dp) :: along(2), ahead(2), length, first, last, bound, inside, onset, sticks, slips
 
-      loss = max(dot_product(after, slip), 0.0_dp)
-      first = dot_product(before, slip)
-      if (first >= 0.0_dp .and. .not. stuck) loss = 0.5_dp*(first + loss)
+      loss = 0.0_dp
+      if (.not. any(abs([before, after]) > 0.0_dp)) return
+      length = norm2(slip)
+      if (.not. length > 0.0_dp) return
+      along = slip/length
+      first = dot_product(before, along)
+      last = max(dot_product(after, along), 0.0_dp)
+
+      ! The bound of the start, in the direction of the traction at the end: on a slope it is not that of the slip.
+      ahead = along
+      if (last > 0.0_dp) ahead = after
+      bound = law%ratio_under(force, slope, ahead, [1.0_dp, 1.0_dp])
+      if (bound < unbounded) bound = bound*dot_product(ahead, along)
+      bound = max(min(bound, 2.0_dp*last), first)
+
+      ! The parts of the step in which the cell sticks and slips.
+      inside = (bound - first)*compliance
+      sticks = inside/(inside + length)
+      slips = length/(inside + length)
+      onset = slips*bound + sticks*last
+      loss = 0.5_dp*max(onset + last, 0.0_dp)*length
    end function friction_loss
 
 end module friction_books

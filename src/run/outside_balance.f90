@@ -13,6 +13,10 @@
 !> such a jump the force lies between its values at both ends, so that the error of the trapezoidal rule is at
 !> most half the change of the force times the motion. If the work from outside exceeds the work inside by
 !> more than this, no path of equilibria explains the excess, and all of it counts as radiated.
+!>
+!> If friction acts, the trapezoidal rule does not apply to the drive in the first step of a motion. On a half-space the
+!> whole contact may slip after a small part of this step, with the force at its final value from then on; the mean of
+!> both ends would be half of that. The work of the drive is then set equal to what the fields store and lose.
 module outside_balance
    use history_row, only : history_row_type
    use asperity_precision, only : dp
@@ -24,12 +28,13 @@ module outside_balance
 contains
 
    !> Update work_load, work_drive, energy_radiated and work_missing. All other works of the row are known.
-   pure subroutine book_outside(before, drive_before, drive, inertia, abrupt, adhesive, row)
+   pure subroutine book_outside(before, drive_before, drive, inertia, abrupt, kinked, adhesive, row)
       type(history_row_type), intent(in) :: before   !! the row before
       real(dp), intent(in) :: drive_before(2)        !! horizontal force on the rubber in the row before, N
       real(dp), intent(in) :: drive(2)               !! the same now, N
       real(dp), intent(in) :: inertia(2)             !! the part of it that accelerated the mass, mean over the step, N
       logical, intent(in) :: abrupt                  !! the step is a jump, whose path is not known
+      logical, intent(in) :: kinked                  !! the first step of a motion with friction
       logical, intent(in) :: adhesive
       type(history_row_type), intent(inout) :: row
       real(dp) :: inside, excess, margin, motion(2), sunk
@@ -43,6 +48,10 @@ contains
       sunk = row%displacement - before%displacement
       motion = [row%road_x - before%road_x, row%road_y - before%road_y]
       row%work_load = before%work_load + 0.5_dp*(before%force + row%force)*sunk
+      if (kinked .and. any(abs(motion) > 0.0_dp)) then
+         row%work_drive = before%work_drive + inside - (row%work_load - before%work_load)
+         return
+      end if
       row%work_drive = before%work_drive + dot_product(0.5_dp*(drive_before + drive) - inertia, motion)
 
       excess = row%work_load - before%work_load + row%work_drive - before%work_drive - inside

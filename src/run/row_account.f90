@@ -43,6 +43,7 @@ contains
       type(history_row_type) :: row
       type(cell_sums_type) :: sums
       real(dp) :: force(2), inertia(2)
+      logical :: kinked
 
       sums = sum_cells(contact)
       force = sums%force
@@ -50,8 +51,10 @@ contains
       call fill_contact(contact, plan, sums, row)
       call fill_energies(contact, row)
       inertia = 0.0_dp
+      kinked = .false.
       if (contact%frictional) then
          inertia = contact%state%tangential%block%inertia
+         kinked = contact%rubs() .and. (plan%new_speed .or. contact%tangential%starts)
          call fill_friction(contact, plan, sums%outside, force, row)
       end if
       if (contact%holds()) row%stick_area = row%contact_area
@@ -62,7 +65,7 @@ contains
          row%friction = dot_product(force, contact%state%direction)/row%force
       call fill_solution(contact, found, row)
       call book_outside(contact%state%row, contact%state%drive_force, force, inertia, &
-         plan%steady .or. (plan%instantaneous .and. .not. plan%ramped), contact%normal%adhesive, row)
+         plan%steady .or. (plan%instantaneous .and. .not. plan%ramped), kinked, contact%normal%adhesive, row)
       contact%state%drive_force = force
       contact%state%row = row
    end subroutine account

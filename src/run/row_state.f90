@@ -192,7 +192,7 @@ contains
       call table%add_field('tangential/displacement', t%displacement, 'm', 'tangential displacement')
       call table%add_field('tangential/rubbing', t%rubbing, 'Pa', 'frictional traction T - T* of the last step')
       call table%add_field('tangential/contact', t%contact, '0 open, 1 stick, 2 slip')
-      call table%add_field('tangential/rubbed', t%rubbed, 'contact of the last step at the rubber''s own points')
+      call table%add_field('tangential/force', t%force, 'Pa', 'force of the friction law in the last step')
       call table%add('tangential/forecast/dt', t%forecast%dt, 's', 'length of the last step of the forecast')
       call table%add('tangential/forecast/known', t%forecast%known, 'differences that the forecast knows')
       call table%add('tangential/forecast/order', t%forecast%order, 'order of the forecast')

@@ -92,7 +92,7 @@ contains
       if (.not. allocated(state%tangential%displacement)) return
       self%kept%tangential%displacement = state%tangential%displacement
       self%kept%tangential%rubbing = state%tangential%rubbing
-      self%kept%tangential%rubbed = state%tangential%rubbed
+      self%kept%tangential%force = state%tangential%force
    end subroutine keep_more
 
    !> The numbers that arms have on this process.
@@ -152,7 +152,7 @@ contains
       call move_alloc(from%arms%arm, to%arms%arm)
       call move_alloc(from%tangential%displacement, to%tangential%displacement)
       call move_alloc(from%tangential%rubbing, to%tangential%rubbing)
-      call move_alloc(from%tangential%rubbed, to%tangential%rubbed)
+      call move_alloc(from%tangential%force, to%tangential%force)
       call move_alloc(from%tangential%arms%s, to%tangential%arms%s)
       call move_alloc(from%tangential%arms%ds, to%tangential%arms%ds)
       call move_alloc(from%tangential%arms%arm, to%tangential%arms%arm)

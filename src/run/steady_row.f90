@@ -99,8 +99,10 @@ contains
             star = tangential%law%normal_traction(found%pressure(i, j), slope)
             state%contact(i, j) = contact_open
             state%rubbing(i, :, j) = 0.0_dp
+            state%force(i, j) = 0.0_dp
             if (found%pressure(i, j) <= 0.0_dp .and. .not. any(abs(found%traction(i, :, j)) > 0.0_dp)) cycle
             state%rubbing(i, :, j) = state%traction(i, :, j) - star
+            state%force(i, j) = tangential%law%friction_force(found%pressure(i, j), slope, [1.0_dp, 1.0_dp])
             state%contact(i, j) = contact_slip
             if (.not. found%pressure(i, j) > 0.0_dp) cycle       ! partly sheared: it slips
             ! A traction that is only known to the tolerance may lie within the bound though the cell slips. The slip
@@ -110,7 +112,6 @@ contains
                state%contact(i, j) = contact_stick
          end do
       end do
-      state%rubbed(:, :) = state%contact
       state%before(:, :, :) = state%traction
       tangential%trial(:, :, :) = state%displacement
       tangential%slip(:, :, :) = 0.0_dp

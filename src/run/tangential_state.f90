@@ -3,7 +3,8 @@
 !> This is plain data, with which module `tangential_step` solves a step.
 !>
 !> Memory, in fields of doubles with two components each: T, T of the step before, U, T - T* of the step before at the
-!> rubber's own points; those of the forecast of U_T; the state of the arms (S, S - S_old, one field per arm).
+!> rubber's own points; those of the forecast of U_T; the state of the arms (S, S - S_old, one field per arm). One field
+!> has a single component: the force of the law in the step before, at the rubber's own points.
 module tangential_state
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int8
@@ -30,7 +31,7 @@ module tangential_state
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
       real(dp), allocatable :: rubbing(:, :, :)       !! T - T* at the end of the last step, Pa
       integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip
-      integer(int8), allocatable :: rubbed(:, :)      !! the same at the end of the last step
+      real(dp), allocatable :: force(:, :)            !! of the law at the end of the last step, Pa; 0 if open
       type(place_forecast_type) :: forecast           !! of U_T in the next step
       type(arm_state_type) :: arms
       type(energy_books_type) :: books                !! of the strain of the rubber
@@ -55,8 +56,8 @@ contains
       self%block%area = grid%area()
       allocate (self%traction(grid%nx, 2, grid%rows()), source=0.0_dp)
       allocate (self%before, self%displacement, self%rubbing, source=self%traction)
-      allocate (self%contact(grid%nx, grid%rows()), self%rubbed(grid%nx, grid%rows()), &
-         source=contact_open)
+      allocate (self%contact(grid%nx, grid%rows()), source=contact_open)
+      allocate (self%force(grid%nx, grid%rows()), source=0.0_dp)
       call new_place_forecast(self%forecast, grid%nx, grid%rows())
       call new_arm_state(self%arms, material, grid%nx, grid%rows(), 2, error)
       call new_books(self%books, material, grid%cell_area())

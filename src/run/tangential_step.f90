@@ -14,11 +14,11 @@ module tangential_step
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
    use case_settings, only : case_type
    use asperity_errors, only : error_type
-   use friction_books, only : book_friction, rubbed_type
+   use friction_books, only : book_friction, book_rest, rubbed_type
    use field_sums, only : field_count, vector_sum
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
-   use friction_law, only : contact_stick, friction_law_type, new_friction_law
+   use friction_law, only : contact_slip, contact_stick, friction_law_type, new_friction_law
    use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use road_pull, only : road_pull_type
@@ -49,6 +49,7 @@ module tangential_step
       !> The share of its bound that each cell may carry [nx, rows]. If it is not allocated, cells in contact carry the
       !> whole bound.
       real(dp), allocatable :: share(:, :)
+      logical :: starts = .false.                     !! the step follows a jump, or is the first one with friction
       type(convolution_type), private :: operator
       type(friction_solver_type), private :: solver
       real(dp), allocatable, private :: drive(:, :, :)    !! DX' [nx, 2, rows]
@@ -129,6 +130,7 @@ contains
       ! being the scale of the residual.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
       if (.not. dt > 0.0_dp) state%pace = 0.0_dp
+      self%starts = .not. state%pace > 0.0_dp
       call past_traction(state%arms, material, self%past)
       self%past_mean = means(self, self%past)
       mean = 0.0_dp
@@ -315,18 +317,25 @@ contains
       compliance = self%compliance/self%q
    end function cell_compliance
 
-   !> End the step: update the arms, the energies and the motion of the mass.
-   subroutine commit(self, state, material, pressure, slope_x, slope_y)
-      class(tangential_step_type), intent(inout) :: self
+   !> End the step: update the arms, the energies and the motion of the mass. Cells that stick are marked.
+   subroutine commit(self, state, material, pressure, gap, slope_x, slope_y)
+      class(tangential_step_type), intent(inout), target :: self
       type(tangential_state_type), intent(inout) :: state
       type(zener_type), intent(in) :: material
-      real(dp), intent(in) :: pressure(:, :)
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      real(dp), intent(in), contiguous, target :: pressure(:, :)
+      real(dp), intent(in) :: gap(:, :)
+      real(dp), intent(in), contiguous, target :: slope_x(:, :), slope_y(:, :)
       type(products_type) :: products
       type(rubbed_type) :: rubbed
+      type(friction_fields_type) :: fields
+      real(dp), allocatable, target :: weighed(:, :)
       real(dp) :: carried(2), before(2), after(2)
 
-      if (.not. state%moved) return
+      if (.not. state%moved) then
+         call book_rest(state, self%law, self%adhesive, pressure, gap, slope_x, slope_y)
+         return
+      end if
+      call mark_idle(self, state)
       products = new_products(material)
       carried = 0.0_dp
       if (state%block%mass > 0.0_dp) then
@@ -338,15 +347,38 @@ contains
       call commit_arms(state%arms, material, state%traction, state%displacement, self%trial, &
          products, carried)
       call book_step(state%books, material, products)
+      fields%pressure => pressure
       if (allocated(self%share)) then
-         call book_friction(state, self%law, self%trial, self%slip, pressure*self%share, slope_x, slope_y, rubbed)
-      else
-         call book_friction(state, self%law, self%trial, self%slip, pressure, slope_x, slope_y, rubbed)
+         weighed = pressure*self%share
+         fields%pressure => weighed
+         fields%share => self%share
       end if
+      fields%slope_x => slope_x
+      fields%slope_y => slope_y
+      fields%slip => self%slip
+      call book_friction(state, self%law, self%cell_compliance(), fields, self%trial, rubbed)
       state%lost_friction = state%lost_friction + rubbed%loss*self%grid%cell_area()
       if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%motion/(rubbed%cells*self%dt)
       state%displacement(:, :, :) = self%trial
    end subroutine commit
+
+   !> Mark cells as sticking that are on their bound, but whose slip is not larger than the error of the solver may be.
+   !> Which of the two states the solver assigns to such a cell is round-off: for example when the road has stopped.
+   subroutine mark_idle(self, state)
+      type(tangential_step_type), intent(in) :: self
+      type(tangential_state_type), intent(inout) :: state
+      real(dp) :: least
+      integer :: i, j
+
+      least = self%solver%resolved_slip/self%q
+      !$omp parallel do default(none) shared(self, state, least) private(i, j)
+      do j = 1, self%grid%rows()
+         do i = 1, self%grid%nx
+            if (state%contact(i, j) == contact_slip .and. norm2(self%slip(i, :, j)) <= least) &
+               state%contact(i, j) = contact_stick
+         end do
+      end do
+   end subroutine mark_idle
 
    !> Compute the mean traction, the fraction of the grid that sticks, and the mean slip of the step.
    subroutine sums(self, state, traction, stick, slip)
