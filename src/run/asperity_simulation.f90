@@ -304,8 +304,8 @@ contains
       if (outcome%residual <= self%allowed .and. outcome%load_error > self%allowed) self%residual = outcome%load_error
    end subroutine note_outcome
 
-   !> One sentence about a row that has not converged. It compares an error with the allowed one only if this error is the
-   !> reason.
+   !> One sentence about a row that has not converged. It compares an error with the allowed one only if this error is
+   !> the reason.
    function failure(self) result(text)
       class(simulation_type), intent(in) :: self
       character(:), allocatable :: text
