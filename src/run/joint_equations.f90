@@ -20,6 +20,7 @@ module joint_equations
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_law, only : contact_open, contact_slip, contact_stick
    use joint_system, only : joint_state_type, joint_system_type
+   use joint_tiles, only : even, near_values, odd
    use regular_grid, only : boundary_periodic, grid_type
    use rubber_kernels, only : normal_kernel
    implicit none
@@ -43,6 +44,8 @@ module joint_equations
       procedure :: prepare
       procedure :: start
       procedure :: evaluate
+      procedure :: slopes_at
+      procedure :: slip_of
       procedure :: return_solution
       procedure :: destroy
    end type joint_equations_type
@@ -82,7 +85,9 @@ contains
       self%contact => contact
       self%plan = plan
       self%grid = contact%grid
-      self%evaluations = 0
+      call find_responses(self, contact)
+      self%evaluations = 2                             ! the responses take almost as many transforms
+      self%level_is_given = plan%control == 'displacement'
       self%most_evaluations = most_evaluations
       associate (rules => self%rules, state => contact%state)
          rules%potential = contact%normal%potential
@@ -96,6 +101,50 @@ contains
          begun%level = state%level
       end associate
    end subroutine start
+
+   !> Find the displacements around a cell under its unit pressure and its unit tractions: ten transforms.
+   subroutine find_responses(self, contact)
+      type(joint_equations_type), intent(inout) :: self
+      class(contact_type), intent(inout) :: contact
+      real(dp), allocatable :: load(:, :), u(:, :), shear(:, :, :)
+      integer :: c, k, nx, ny
+
+      nx = self%grid%nx
+      ny = self%grid%rows()
+      allocate (load(nx, ny), u(nx, ny), shear(nx, ny, 2), source=0.0_dp)
+      if (self%grid%first_row == 1 .and. ny > 0) load(1, 1) = 1.0_dp
+      call self%operator%apply(load, u)
+      self%near%depth = near_values(self%grid, u, even)/contact%material%q
+      do c = 1, 2
+         call contact%tangential%respond(load, c, shear)
+         do k = 1, 2
+            self%near%place(k, c, :, :) = near_values(self%grid, shear(:, :, k), merge(even, odd, k == c))
+         end do
+      end do
+      ! The slip is that of the road over the rubber.
+      self%near%slip = -self%near%place
+   end subroutine find_responses
+
+   !> Read the slopes of the road near the displaced cells.
+   subroutine slopes_at(self, shift, height, slope_x, slope_y)
+      class(joint_equations_type), intent(inout) :: self
+      real(dp), intent(in) :: shift(2)
+      real(dp), intent(out) :: height(:, :), slope_x(:, :), slope_y(:, :)
+      real(dp) :: place(2)
+
+      place = self%plan%road - shift
+      call displaced(self%contact%road, place(1), place(2), self%contact%tangential%trial(:, 1, :), &
+         self%contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
+   end subroutine slopes_at
+
+   !> The slip of a cell.
+   pure function slip_of(self, i, j) result(slip)
+      class(joint_equations_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp) :: slip(2)
+
+      slip = self%contact%tangential%slip(i, :, j)
+   end function slip_of
 
    !> Compute the residuals of a state.
    subroutine evaluate(self, state)

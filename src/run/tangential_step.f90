@@ -66,6 +66,7 @@ module tangential_step
       procedure :: solve
       procedure :: try
       procedure :: cell_compliance
+      procedure :: respond
       procedure :: correct_motion
       procedure :: commit
       procedure :: sums
@@ -316,6 +317,24 @@ contains
 
       compliance = self%compliance/self%q
    end function cell_compliance
+
+   !> Compute the change of the trial displacement by a traction along one direction: four transforms.
+   subroutine respond(self, traction, along, change)
+      class(tangential_step_type), intent(inout) :: self
+      real(dp), intent(in) :: traction(:, :)          !! [nx, rows] Pa
+      integer, intent(in) :: along                    !! 1: x, 2: y
+      real(dp), intent(inout) :: change(:, :, :)      !! m [nx, rows, 2]
+      real(dp), allocatable :: other(:, :)
+
+      allocate (other, mold=traction)
+      other = 0.0_dp
+      if (along == 1) then
+         call self%operator%apply_vector(traction, other, change(:, :, 1), change(:, :, 2))
+      else
+         call self%operator%apply_vector(other, traction, change(:, :, 1), change(:, :, 2))
+      end if
+      change = change/self%q
+   end subroutine respond
 
    !> End the step: update the arms, the energies and the motion of the mass. Cells that stick are marked.
    subroutine commit(self, state, material, pressure, gap, slope_x, slope_y)

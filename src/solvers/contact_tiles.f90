@@ -1,18 +1,19 @@
 !> Inverses of the normal compliance K on small tiles of the contact.
 !>
-!> The grid is divided into tiles of at most 8 x 8 cells. For each tile the displacements of its cells in contact, and
-!> of those in a rim of one cell around it, are set by pressures on these cells alone. The tile keeps the pressures of its
-!> own cells and drops those of the rim, which belong to other tiles (restricted additive Schwarz). What distant
-!> tiles do to each other is left to the boxes of module `contact_boxes`.
+!> The grid is divided into tiles of at most 8 x 8 cells (module `cell_tiles`). For each tile the displacements of its cells
+!> in contact, and of those in its rim, are set by pressures on these cells alone. What distant tiles do to each other is
+!> left to the boxes of module `contact_boxes`.
 !>
 !> Tiles whose cells are all in contact share one inverse, and a tile that has the same cells in contact as
-!> before keeps its inverse. If processes share the rows, each has every n-th tile.
+!> before keeps its inverse.
 !>
 !> Memory: the inverses in single precision, at most 50 fields if all tiles are almost full, usually 2 to 10. A tile for
 !> which there is no memory divides by the displacement of a cell under its own pressure.
 module contact_tiles
-   use asperity_parallel, only : global_sum, process_count, process_number
+   use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, sp
+   use cell_tiles, only : tile_cells_type, tile_layout_type, tile_rim
+   use dense_factors, only : invert
    use steady_operator, only : steady_operator_type
    implicit none
    private
@@ -20,25 +21,18 @@ module contact_tiles
    public :: contact_tiles_type
 
    integer, parameter :: side = 8                !! cells along a side of a tile, at most
-   integer, parameter :: rim = 1                 !! cells around it
-   integer, parameter :: reach = side + 2*rim - 1   !! largest distance of two cells of a tile
-   integer, parameter :: most = (side + 2*rim)**2   !! cells of a tile and its rim
+   integer, parameter :: reach = side + 2*tile_rim - 1   !! largest distance of two cells of a tile
 
-   !> A tile. Its own cells come first in its lists, then those of the rim.
-   type :: tile_type
-      integer :: own = 0                         !! its own cells in contact
+   !> A tile.
+   type, extends(tile_cells_type) :: tile_type
       integer :: twin = 0                        !! the tile whose inverse it uses; 0: its own one
-      integer, allocatable :: places(:, :)       !! of the cells in contact, relative to the tile [2, n]
-      integer, allocatable :: numbers(:)         !! of these cells in the list of all cells in contact
       real(sp), allocatable :: inverse(:, :)     !! of K over the displacement by a cell's own pressure [own, n]
    end type tile_type
 
    !> All tiles of a grid.
    type :: contact_tiles_type
-      integer, private :: cells(2) = 0           !! of the grid
-      integer, private :: tiles(2) = 0
+      type(tile_layout_type), private :: layout
       integer, private :: threads = 1
-      logical, private :: shared = .false.       !! processes share the rows
       real(dp) :: soft = 0.0_dp                  !! displacement of a cell under its own unit pressure, m/Pa
       real(dp), private :: spring = 0.0_dp       !! compliance of a spring on each cell, m/Pa
       real(sp), private :: near(-reach:reach, -reach:reach) = 0.0_sp   !! K over `soft`
@@ -59,26 +53,24 @@ contains
       real(dp) :: near(2*reach + 1, 2*reach + 1)
       integer :: at(2), i, j
 
-      self%cells = [operator%nx, operator%ny]
-      self%tiles = (self%cells + side - 1)/side
+      self%layout = tile_layout_type(side, [operator%nx, operator%ny], operator%grid%shared, periodic=.true.)
       self%threads = operator%threads
-      self%shared = operator%grid%shared
       allocate (load(operator%nx, operator%rows), u(operator%nx, operator%rows), source=0.0_dp)
       if (operator%grid%first_row == 1 .and. operator%rows > 0) load(1, 1) = 1.0_dp
       call operator%displace(load, u)
       near = 0.0_dp
       do j = -reach, reach
          do i = -reach, reach
-            at = modulo([i, j], self%cells) + 1
+            at = modulo([i, j], self%layout%cells) + 1
             at(2) = at(2) - operator%grid%first_row + 1
             if (at(2) >= 1 .and. at(2) <= operator%rows) near(i + reach + 1, j + reach + 1) = u(at(1), at(2))
          end do
       end do
-      if (self%shared) near = reshape(global_sum(reshape(near, [size(near)])), shape(near))
+      if (self%layout%shared) near = reshape(global_sum(reshape(near, [size(near)])), shape(near))
       self%soft = near(reach + 1, reach + 1)
       self%near = real(near/self%soft, sp)
       if (allocated(self%tile)) deallocate (self%tile)
-      allocate (self%tile(product(self%tiles)))
+      allocate (self%tile(product(self%layout%tiles)))
    end subroutine begin
 
    !> Prepare for another set of cells in contact.
@@ -96,16 +88,16 @@ contains
       !$omp parallel do default(none) shared(self, number, changed) private(t) num_threads(self%threads)
       do t = 1, size(self%tile)
          changed(t) = .false.
-         if (is_mine(self, t)) call list_cells(self, number, t, self%tile(t), changed(t))
+         if (self%layout%is_mine(t)) call self%layout%list_cells(number, t, self%tile(t), changed(t))
       end do
 
       full = 0
       do t = 1, size(self%tile)
-         if (.not. is_mine(self, t)) cycle
-         call find_extent(self, t, area, extent)
+         if (.not. self%layout%is_mine(t)) cycle
+         call self%layout%find_extent(t, area, extent)
          associate (first => full(extent(1), extent(2)))
             self%tile(t)%twin = 0
-            if (size(self%tile(t)%numbers) < product(extent + 2*rims(self, extent))) cycle
+            if (size(self%tile(t)%numbers) < product(extent + 2*self%layout%rims(extent))) cycle
             self%tile(t)%twin = first
             if (first == 0) first = t
          end associate
@@ -113,79 +105,13 @@ contains
 
       !$omp parallel do default(none) shared(self, changed, other) private(t) schedule(dynamic) num_threads(self%threads)
       do t = 1, size(self%tile)
-         if (.not. is_mine(self, t)) cycle
+         if (.not. self%layout%is_mine(t)) cycle
          associate (tile => self%tile(t))
             if (allocated(tile%inverse) .and. (changed(t) .or. other .or. tile%twin > 0)) deallocate (tile%inverse)
             if (tile%own > 0 .and. tile%twin == 0 .and. .not. allocated(tile%inverse)) call invert_tile(self, tile)
          end associate
       end do
    end subroutine renew
-
-   !> Does this process have the tile?
-   pure function is_mine(self, t) result(mine)
-      type(contact_tiles_type), intent(in) :: self
-      integer, intent(in) :: t
-      logical :: mine
-
-      mine = .true.
-      if (self%shared) mine = modulo(t, process_count()) == process_number()
-   end function is_mine
-
-   !> Find the cell before a tile, and the number of its cells along both directions.
-   pure subroutine find_extent(self, t, before, extent)
-      type(contact_tiles_type), intent(in) :: self
-      integer, intent(in) :: t
-      integer, intent(out) :: before(2), extent(2)
-      integer :: at(2)
-
-      at = [modulo(t - 1, self%tiles(1)), (t - 1)/self%tiles(1)]
-      before = at*self%cells/self%tiles
-      extent = (at + 1)*self%cells/self%tiles - before
-   end subroutine find_extent
-
-   !> The width of the rim along both directions. On a grid of few cells a tile may meet itself.
-   pure function rims(self, extent) result(width)
-      type(contact_tiles_type), intent(in) :: self
-      integer, intent(in) :: extent(2)
-      integer :: width(2)
-
-      width = min(rim, (self%cells - extent)/2)
-   end function rims
-
-   !> List the cells of a tile that are in contact, first its own and then those of the rim.
-   subroutine list_cells(self, number, t, tile, changed)
-      type(contact_tiles_type), intent(in) :: self
-      integer, intent(in) :: number(:, :)
-      integer, intent(in) :: t
-      type(tile_type), intent(inout) :: tile
-      logical, intent(out) :: changed            !! other cells than before are in contact
-      integer :: at(2), before(2), extent(2), i, j, n, numbers(most), part, places(2, most), width(2)
-      logical :: inside
-
-      call find_extent(self, t, before, extent)
-      width = rims(self, extent)
-      n = 0
-      do part = 1, 2
-         do j = 1 - width(2), extent(2) + width(2)
-            do i = 1 - width(1), extent(1) + width(1)
-               inside = i >= 1 .and. i <= extent(1) .and. j >= 1 .and. j <= extent(2)
-               if (inside .neqv. part == 1) cycle
-               at = modulo(before + [i, j] - 1, self%cells) + 1
-               if (number(at(1), at(2)) == 0) cycle
-               n = n + 1
-               places(:, n) = [i, j]
-               numbers(n) = number(at(1), at(2))
-            end do
-         end do
-         if (part == 1) tile%own = n
-      end do
-
-      changed = .not. allocated(tile%places)
-      if (.not. changed) changed = size(tile%places, 2) /= n
-      if (.not. changed) changed = any(tile%places /= places(:, :n))
-      tile%places = places(:, :n)
-      tile%numbers = numbers(:n)
-   end subroutine list_cells
 
    !> Compute the inverse of a tile, if there is memory for it.
    subroutine invert_tile(self, tile)
@@ -206,25 +132,6 @@ contains
       if (status == 0) tile%inverse(:, :) = matrix(:tile%own, :)
    end subroutine invert_tile
 
-   !> Replace a matrix by its inverse (Gauss and Jordan). A part of K needs no pivoting, because K has a positive
-   !> real part.
-   pure subroutine invert(a)
-      real(sp), intent(inout), contiguous :: a(:, :)
-      real(sp) :: column(size(a, 1))
-      integer :: j, k
-
-      do k = 1, size(a, 1)
-         column = a(:, k)
-         a(:, k) = 0.0_sp
-         a(k, k) = 1.0_sp
-         a(k, :) = a(k, :)/column(k)
-         column(k) = 0.0_sp
-         do j = 1, size(a, 2)
-            a(:, j) = a(:, j) - a(k, j)*column
-         end do
-      end do
-   end subroutine invert
-
    !> Find the pressures that displace the cells of each tile as wanted. All processes get all pressures.
    subroutine apply(self, wanted, pressure)
       class(contact_tiles_type), intent(in) :: self
@@ -235,12 +142,12 @@ contains
       pressure = 0.0_dp
       !$omp parallel do default(none) shared(self, wanted, pressure) private(t, twin) num_threads(self%threads)
       do t = 1, size(self%tile)
-         if (.not. is_mine(self, t)) cycle
+         if (.not. self%layout%is_mine(t)) cycle
          if (self%tile(t)%own == 0) cycle
          twin = merge(self%tile(t)%twin, t, self%tile(t)%twin > 0)
          call apply_tile(self, self%tile(t), self%tile(twin), wanted, pressure)
       end do
-      if (self%shared) pressure = global_sum(pressure)
+      if (self%layout%shared) pressure = global_sum(pressure)
    end subroutine apply
 
    !> Apply the inverse of a tile.

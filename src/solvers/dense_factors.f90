@@ -1,15 +1,15 @@
-!> LU factors of a dense matrix that needs no pivoting, such as one with a positive definite symmetric
+!> LU factors and inverses of a dense matrix that needs no pivoting, such as one with a positive definite symmetric
 !> part.
 !>
-!> The work proceeds by blocks of columns: the diagonal block and the panel below it are factored, and then the
+!> The factorisation proceeds by blocks of columns: the diagonal block and the panel below it are factored, and then the
 !> rest of the matrix is updated by matrix products. Threads share the columns of the rest, so that results do
 !> not depend on their number.
 module dense_factors
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, sp
    implicit none
    private
 
-   public :: factor, solve_factors
+   public :: factor, invert, solve_factors
 
    integer, parameter :: block = 48
 
@@ -58,5 +58,28 @@ contains
          b(:k - 1) = b(:k - 1) - b(k)*a(:k - 1, k)
       end do
    end subroutine solve_factors
+
+   !> Replace a small matrix by its inverse (Gauss and Jordan). A pivot below `least` is replaced by 1, so that an unknown
+   !> that the equations do not determine remains small.
+   pure subroutine invert(a, least)
+      real(sp), intent(inout), contiguous :: a(:, :)
+      real(sp), intent(in), optional :: least
+      real(sp) :: column(size(a, 1))
+      integer :: j, k
+
+      do k = 1, size(a, 1)
+         column = a(:, k)
+         if (present(least)) then
+            if (abs(column(k)) < least) column(k) = 1.0_sp
+         end if
+         a(:, k) = 0.0_sp
+         a(k, k) = 1.0_sp
+         a(k, :) = a(k, :)/column(k)
+         column(k) = 0.0_sp
+         do j = 1, size(a, 2)
+            a(:, j) = a(:, j) - a(k, j)*column
+         end do
+      end do
+   end subroutine invert
 
 end module dense_factors

@@ -1,7 +1,9 @@
 !> Newton's method for all unknowns of a contact with friction: the pressures, gaps, tractions and the level
 !> (module `joint_system`).
 !>
-!> Newton's steps are computed by GMRES, whose products with the derivative of the equations are finite differences.
+!> Newton's steps are computed by GMRES, whose products with the derivative of the equations are finite differences. An
+!> approximate inverse of the system (module `joint_system`) is applied before each product, so that GMRES measures the
+!> true residual.
 !> They are shortened if they do not reduce the residual. The gaps of open cells are not unknowns, but follow from the
 !> other unknowns (with adhesion only those of cells that are hardly attracted). If the method fails and a traction may
 !> jump, the equations are regularised: the pressure rises slightly with s in partly sheared cells, which removes the
@@ -11,7 +13,7 @@
 !> and direction. If there is not enough memory, nothing is solved.
 module joint_newton
    use adhesion_potential, only : adhesive_curvature
-   use asperity_parallel, only : any_process
+   use asperity_parallel, only : any_process, rows_before
    use asperity_precision, only : dp
    use field_sums, only : field_count, largest_of_rows
    use gmres, only : cell_vector_type, gmres_type
@@ -199,32 +201,36 @@ contains
       logical, intent(out) :: found
       type(gmres_type) :: krylov
       type(cell_vector_type) :: v
-      integer :: cells, status(2)
+      integer :: before, cells, status(2)
 
       call list_cells(self, system)
       cells = self%first(size(self%first)) - 1
+      before = rows_before(cells)
       if (allocated(step%cells)) deallocate (step%cells)
       allocate (step%cells(3, cells), stat=status(1))
       allocate (v%cells(3, cells), stat=status(2))
       found = .not. any_process(any(status /= 0))
       if (.not. found) return
+      call self%trial%copy(self%now)
+      call system%evaluate(self%trial)
+      call system%linearise(self%now, self%first, self%cell, found)
+      if (.not. found) return
 
-      call system%renew(self%now)
       call gather(self, self%now%residual, v)
       v%cells = -v%cells
       v%beside = -self%now%load_residual
-      call system%improve(self%now, self%first, self%cell, v)
       call krylov%begin(v, self%first, most_directions, merge(self%far_accuracy, accuracy, self%now%worst > far))
       do while (krylov%unsolved())
          if (is_to_end(system)) exit
          call krylov%next(v)
+         call system%improve(v, before)
          call change(self, system, v)
          call gather(self, self%trial%residual, v)
          v%beside = self%trial%load_residual
-         call system%improve(self%now, self%first, self%cell, v)
          call krylov%take(v)
       end do
       call krylov%solution(step)
+      call system%improve(step, before)
    end subroutine find_step
 
    !> List the unknown cells.

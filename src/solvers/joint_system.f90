@@ -10,17 +10,24 @@
 !>
 !> Each equation is scaled: lengths by the depth to which the mean pressure of the contact presses a cell, and
 !> tractions by that pressure or by the strength, whichever is larger.
+!>
+!> An approximate inverse of the derivative of the equations couples the cells of small tiles completely (module
+!> `joint_tiles`). The level follows from the load: the tiles also give the change of all unknowns with the level.
 module joint_system
    use asperity_precision, only : dp
+   use asperity_parallel, only : any_process, gather_rows
+   use cell_derivative, only : cell_derivative_type, joint_cell_type, new_cell_derivative
    use field_sums, only : field_count, field_sum, largest_of_rows, row_totals, threads_for
    use gmres, only : cell_vector_type
    use joint_cells, only : cell_rules_type
+   use joint_tiles, only : cell_responses_type, joint_tiles_type
    use regular_grid, only : grid_type
    implicit none
    private
 
    public :: joint_state_type, joint_system_type
 
+   real(dp), parameter :: part_of_cell = 1.0e-4_dp     !! distance of two places where slopes are compared
    real(dp), parameter :: least_slope = 0.05_dp        !! of the road, in the width of the second range of s
 
    !> A state of all cells, and its residuals.
@@ -48,13 +55,21 @@ module joint_system
       real(dp) :: unit_traction = 1.0_dp               !! Pa
       real(dp) :: unit_pressure = 1.0_dp               !! of the mean, Pa
       real(dp) :: root = 1.0_dp                        !! of the number of cells in contact at the start
+      logical :: level_is_given = .false.              !! instead of the load
+      type(cell_responses_type) :: near                !! displacements around a loaded cell
+      type(joint_tiles_type), private :: tiles
+      real(dp), allocatable, private :: lift(:, :)     !! change of all unknowns with the level, scaled [3, all cells]
+      real(dp), private :: lift_pressure = 0.0_dp      !! mean pressure of this change, Pa
    contains
       procedure(evaluate_state), deferred :: evaluate
-      procedure :: renew
+      procedure(read_slopes), deferred :: slopes_at
+      procedure(read_slip), deferred :: slip_of
+      procedure :: linearise
       procedure :: improve
       procedure :: begin
       procedure :: cell_residual
       procedure :: sum_residuals
+      procedure, private :: mean_pressure
    end type joint_system_type
 
    abstract interface
@@ -64,6 +79,22 @@ module joint_system
          class(joint_system_type), intent(inout) :: self
          type(joint_state_type), intent(inout) :: state
       end subroutine evaluate_state
+
+      !> Read the slopes of the road near the displaced cells of the state that was evaluated last.
+      subroutine read_slopes(self, shift, height, slope_x, slope_y)
+         import :: dp, joint_system_type
+         class(joint_system_type), intent(inout) :: self
+         real(dp), intent(in) :: shift(2)              !! of the places where the road is read, m
+         real(dp), intent(out) :: height(:, :), slope_x(:, :), slope_y(:, :)
+      end subroutine read_slopes
+
+      !> The slip of a cell in this state as the friction law reads it, m.
+      pure function read_slip(self, i, j) result(slip)
+         import :: dp, joint_system_type
+         class(joint_system_type), intent(in) :: self
+         integer, intent(in) :: i, j
+         real(dp) :: slip(2)
+      end function read_slip
    end interface
 
 contains
@@ -93,20 +124,117 @@ contains
       self%worst = other%worst
    end subroutine copy
 
-   !> Prepare `improve` for a state. Here there is nothing to prepare.
-   subroutine renew(self, state)
+   !> Prepare `improve` for a state, which has been evaluated last. `done` is .false. if there is not enough memory.
+   subroutine linearise(self, state, first, cell, done)
       class(joint_system_type), intent(inout) :: self
       type(joint_state_type), intent(in) :: state
-   end subroutine renew
-
-   !> Multiply scaled residuals of a list of cells by an approximate inverse of the derivative of the equations, so
-   !> that GMRES takes fewer directions. Here the approximation is 1.
-   subroutine improve(self, state, first, cell, v)
-      class(joint_system_type), intent(inout) :: self
-      type(joint_state_type), intent(in) :: state
-      integer, intent(in) :: first(:)                  !! [rows + 1] the first cell of each row in the list
+      integer, intent(in) :: first(:)                  !! [rows + 1] the first cell of each row in the list of cells
       integer, intent(in) :: cell(:)                   !! the cells of the list, i
-      type(cell_vector_type), intent(inout) :: v
+      logical, intent(out) :: done
+      type(joint_cell_type), allocatable :: cells(:)
+      type(cell_derivative_type), allocatable :: derivative(:)
+      integer :: k, n, status(2)
+
+      n = first(size(first)) - 1
+      allocate (cells(n), stat=status(1))
+      allocate (derivative(n), stat=status(2))
+      done = .not. any_process(any(status /= 0))
+      if (done) call describe_cells(self, state, first, cell, cells, done)
+      if (.not. done) return
+
+      !$omp parallel do default(none) shared(self, cells, derivative, n)
+      do k = 1, n
+         derivative(k) = new_cell_derivative(self%rules, cells(k), self%unit_length, self%unit_traction)
+      end do
+      deallocate (cells)
+      call self%tiles%renew(self%grid, first, cell, derivative, self%near, [self%unit_length, self%unit_traction])
+
+      if (allocated(self%lift)) deallocate (self%lift)
+      allocate (self%lift(3, size(self%tiles%derivative)), source=0.0_dp)
+      self%lift(1, :) = 1.0_dp
+      call self%tiles%apply(self%lift)
+      self%lift_pressure = self%mean_pressure(self%lift)
+   end subroutine linearise
+
+   !> Collect the state of each listed cell, and the road under it.
+   subroutine describe_cells(self, state, first, cell, cells, done)
+      class(joint_system_type), intent(inout) :: self
+      type(joint_state_type), intent(in) :: state
+      integer, intent(in) :: first(:), cell(:)
+      type(joint_cell_type), intent(inout) :: cells(:)
+      logical, intent(out) :: done
+      real(dp), allocatable :: road(:, :, :)           !! height and slopes
+      real(dp) :: shift(2), step
+      integer :: along, i, j, k, status
+
+      allocate (road(size(state%s, 1), size(state%s, 2), 3), stat=status)
+      done = .not. any_process(status /= 0)
+      if (.not. done) return
+      do along = 0, 2
+         shift = 0.0_dp
+         step = 1.0_dp
+         if (along > 0) then
+            step = part_of_cell*merge(self%grid%dx, self%grid%dy, along == 1)
+            shift(along) = step
+         end if
+         call self%slopes_at(shift, road(:, :, 1), road(:, :, 2), road(:, :, 3))
+         do j = 1, size(state%s, 2)
+            do k = first(j), first(j + 1) - 1
+               i = cell(k)
+               if (along > 0) then
+                  cells(k)%curvature(:, along) = (road(i, j, 2:3) - cells(k)%slope)/step
+               else
+                  cells(k)%s = state%s(i, j)
+                  cells(k)%t = state%t(i, :, j)
+                  cells(k)%width = self%width(i, j)
+                  cells(k)%slip = self%slip_of(i, j)
+                  cells(k)%slope = road(i, j, 2:3)
+               end if
+            end do
+         end do
+      end do
+   end subroutine describe_cells
+
+   !> The mean over the grid of the pressure that changes of the unknowns cause, Pa.
+   pure function mean_pressure(self, v) result(mean)
+      class(joint_system_type), intent(in) :: self
+      real(dp), intent(in) :: v(:, :)                  !! scaled [3, all cells]
+      real(dp) :: mean
+      integer :: n
+
+      mean = 0.0_dp
+      do n = 1, size(v, 2)
+         mean = mean + v(1, n)*self%tiles%derivative(n)%pressure
+      end do
+      mean = mean/self%grid%cells()
+   end function mean_pressure
+
+   !> Replace scaled residuals by the changes of the scaled unknowns that would nearly remove them.
+   subroutine improve(self, v, before)
+      class(joint_system_type), intent(in) :: self
+      type(cell_vector_type), intent(inout) :: v       !! of the cells of this process
+      integer, intent(in) :: before                    !! listed cells of the processes before this one
+      real(dp), allocatable :: all_cells(:, :)
+      real(dp) :: level                                !! change of the level, scaled
+      integer :: n
+
+      if (self%grid%shared) then
+         all_cells = gather_rows(v%cells)
+      else
+         all_cells = v%cells
+      end if
+      call self%tiles%apply(all_cells)
+
+      level = v%beside/self%root
+      if (.not. self%level_is_given) then
+         level = 0.0_dp
+         if (abs(self%lift_pressure) > 0.0_dp) level = (v%beside*self%unit_pressure/self%root &
+            - self%mean_pressure(all_cells))/self%lift_pressure
+      end if
+      v%beside = level*self%root
+      do n = 1, size(v%cells, 2)
+         v%cells(:, n) = all_cells(:, before + n) + level*self%lift(:, before + n)
+      end do
    end subroutine improve
 
    !> Begin with a contact: choose the units and the width of the second range, and make the first state. The caller has

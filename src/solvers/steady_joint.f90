@@ -6,21 +6,19 @@
 !> contact. With the jump there is often no solution.
 !>
 !> Newton's method starts from a contact that is near the solution, or follows a path of solutions (`follow_path`).
-!> An evaluation takes eight transforms. GMRES uses an approximate inverse on the cells in contact (module
-!> `steady_inverse`).
+!> An evaluation takes eight transforms.
 module steady_joint
-   use asperity_interpolation, only : interpolation_type
+   use asperity_interpolation, only : displaced, interpolation_type
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
    use field_sums, only : field_count, field_mean, field_sum, ratio_of_lengths
    use friction_law, only : friction_law_type
-   use gmres, only : cell_vector_type
    use joint_newton, only : joint_newton_type
    use joint_system, only : joint_state_type, joint_system_type
+   use joint_tiles, only : cell_responses_type, near_values, neither
    use normal_state, only : normal_problem_type, reason_converged
    use regular_grid, only : grid_type
    use steady_contact, only : judge_gap, read_road, sliding_outcome_type, steady_contact_type
-   use steady_inverse, only : contact_inverse_type
    use steady_operator, only : steady_operator_type
    use steady_pace, only : along_path, along_second_path, from_here, no_attempt
    use stop_watch, only : stop_is_due
@@ -52,12 +50,11 @@ module steady_joint
       real(dp) :: target = 0.0_dp                      !! mean pressure, Pa
       real(dp) :: displaced = 1.0_dp                   !! part of u with which the road is read
       real(dp) :: stretched = 1.0_dp                   !! part of du/ds in the slip
-      type(contact_inverse_type) :: inverse
-      real(dp), allocatable :: wanted(:, :)            !! displacements, then pressures of the inverse [nx, rows]
+      type(cell_responses_type) :: whole               !! displacements around a loaded cell, if all of u counts
    contains
       procedure :: evaluate
-      procedure :: renew
-      procedure :: improve
+      procedure :: slopes_at
+      procedure :: slip_of
    end type steady_system_type
 
    !> The method and its work space. A variable of this type must not be copied.
@@ -123,19 +120,14 @@ contains
    subroutine prepare(self, grid)
       class(steady_joint_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
-      integer :: status(3)
+      integer :: status
 
       if (.not. self%newton%ready) call self%newton%prepare(grid)
       if (.not. self%newton%ready) return
       self%newton%far_accuracy = rough
-      allocate (self%system%width(grid%nx, grid%rows()), stat=status(1))
-      allocate (self%system%wanted(grid%nx, grid%rows()), stat=status(2))
-      call self%system%inverse%make_room(grid, status(3))
-      self%ready = .not. any_process(any(status /= 0))
-      if (self%ready) return
-      if (allocated(self%system%width)) deallocate (self%system%width)
-      if (allocated(self%system%wanted)) deallocate (self%system%wanted)
-      self%system%inverse = contact_inverse_type()
+      allocate (self%system%width(grid%nx, grid%rows()), stat=status)
+      self%ready = .not. any_process(status /= 0)
+      if (.not. self%ready .and. allocated(self%system%width)) deallocate (self%system%width)
    end subroutine prepare
 
    !> The largest number of evaluations of an attempt. On small grids they cost little time, and contacts of few cells
@@ -207,6 +199,9 @@ contains
 
       system%displaced = part
       if (attempt == along_path) system%stretched = part
+      system%near = system%whole
+      system%near%place = system%displaced*system%whole%place
+      system%near%slip = system%stretched*system%whole%slip
    end subroutine count_part
 
    !> Predict a state on the straight line through two others.
@@ -232,30 +227,41 @@ contains
       type(joint_state_type), intent(inout) :: begun
 
       associate (contact => system%contact, rules => system%rules)
-         call find_softness(system%operator, rules%soft, rules%soft_along)
-         call system%inverse%begin(system%operator)
+         call find_responses(system)
          call system%begin(contact%pressure > 0.0_dp, contact%pressure, contact%gap, contact%traction, &
             contact%slope_x, contact%slope_y, sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2)), begun)
          begun%level = contact%level
       end associate
    end subroutine start
 
-   !> Compute the displacements of a cell under its own unit pressure and under its own unit traction, m/Pa.
-   subroutine find_softness(operator, soft, soft_along)
-      type(steady_operator_type), intent(inout) :: operator
-      real(dp), intent(out) :: soft, soft_along
+   !> Find the displacements around a cell under its unit pressure and its unit tractions: 14 transforms.
+   subroutine find_responses(system)
+      type(steady_system_type), intent(inout) :: system
       real(dp), allocatable :: load(:, :), u(:, :), traction(:, :, :), shear(:, :, :), stretch(:, :, :)
+      integer :: c, k
 
-      allocate (load(operator%nx, operator%rows), u(operator%nx, operator%rows), source=0.0_dp)
-      allocate (traction(operator%nx, 2, operator%rows), shear(operator%nx, 2, operator%rows), &
-         stretch(operator%nx, 2, operator%rows), source=0.0_dp)
-      if (operator%grid%first_row == 1 .and. operator%rows > 0) load(1, 1) = 1.0_dp
-      call operator%displace(load, u)
-      soft = field_sum(load*u)
-      traction(:, 1, :) = load
-      call operator%shear(traction, shear, stretch)
-      soft_along = field_sum(load*shear(:, 1, :))
-   end subroutine find_softness
+      associate (operator => system%operator, near => system%whole)
+         allocate (load(operator%nx, operator%rows), u(operator%nx, operator%rows), source=0.0_dp)
+         allocate (traction(operator%nx, 2, operator%rows), shear(operator%nx, 2, operator%rows), &
+            stretch(operator%nx, 2, operator%rows))
+         if (operator%grid%first_row == 1 .and. operator%rows > 0) load(1, 1) = 1.0_dp
+         call operator%displace(load, u)
+         near%depth = near_values(operator%grid, u, neither)
+         do c = 1, 2
+            traction = 0.0_dp
+            traction(:, c, :) = load
+            call operator%shear(traction, shear, stretch)
+            do k = 1, 2
+               near%place(k, c, :, :) = near_values(operator%grid, shear(:, k, :), neither)
+               near%slip(k, c, :, :) = near_values(operator%grid, stretch(:, k, :), neither)
+            end do
+         end do
+         system%rules%soft = near%depth(0, 0)
+         system%rules%soft_along = near%place(1, 1, 0, 0)
+         near%slip = system%c*system%rules%soft_along*near%slip
+         system%near = near
+      end associate
+   end subroutine find_responses
 
    !> Compute the residuals of a state.
    subroutine evaluate(self, state)
@@ -280,53 +286,38 @@ contains
       type(steady_system_type), intent(in) :: self
       type(steady_contact_type), intent(in) :: contact      !! its gap holds U_z
       type(joint_state_type), intent(inout) :: state
-      real(dp) :: stretch
       integer :: i, j
 
-      stretch = self%c*self%rules%soft_along           ! converts r to a length: T + c_t r is returned to the bound
-      !$omp parallel do default(none) shared(self, contact, state, stretch) private(i, j)
+      !$omp parallel do default(none) shared(self, contact, state) private(i, j)
       do j = 1, self%grid%rows()
          do i = 1, self%grid%nx
             call self%cell_residual(state, i, j, contact%gap(i, j) - contact%height(i, j), contact%pressure(i, j), &
-               [contact%slope_x(i, j), contact%slope_y(i, j)], stretch*contact%slip(i, :, j))
+               [contact%slope_x(i, j), contact%slope_y(i, j)], self%slip_of(i, j))
          end do
       end do
       call self%sum_residuals(state, contact%pressure, self%target)
    end subroutine compare
 
-   !> Prepare the approximate inverse for the cells that carry pressure in a state.
-   subroutine renew(self, state)
+   !> Read the slopes of the road near the displaced cells.
+   subroutine slopes_at(self, shift, height, slope_x, slope_y)
       class(steady_system_type), intent(inout) :: self
-      type(joint_state_type), intent(in) :: state
+      real(dp), intent(in) :: shift(2)
+      real(dp), intent(out) :: height(:, :), slope_x(:, :), slope_y(:, :)
+      real(dp) :: place(2)
 
-      call self%inverse%renew(state%s >= self%width)
-   end subroutine renew
+      place = self%base + self%contact%offset - shift
+      call displaced(self%road, place(1), place(2), self%contact%displacement(:, 1, :), &
+         self%contact%displacement(:, 2, :), height, slope_x, slope_y)
+   end subroutine slopes_at
 
-   !> Replace the residuals of gap and load by the changes of pressure and level that would remove them if the
-   !> tractions did not change. Those of the tractions remain as they are.
-   subroutine improve(self, state, first, cell, v)
-      class(steady_system_type), intent(inout) :: self
-      type(joint_state_type), intent(in) :: state
-      integer, intent(in) :: first(:), cell(:)
-      type(cell_vector_type), intent(inout) :: v
-      real(dp) :: level
-      integer :: i, j, k
+   !> The slip of a cell as a length: T + c_t r is returned to the bound.
+   pure function slip_of(self, i, j) result(slip)
+      class(steady_system_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp) :: slip(2)
 
-      self%wanted(:, :) = 0.0_dp
-      do j = 1, size(state%s, 2)
-         do k = first(j), first(j + 1) - 1
-            if (self%inverse%inside(cell(k), j)) self%wanted(cell(k), j) = v%cells(1, k)*self%unit_length
-         end do
-      end do
-      call self%inverse%solve(v%beside*self%unit_pressure/self%root, self%wanted, level)
-      do j = 1, size(state%s, 2)
-         do k = first(j), first(j + 1) - 1
-            i = cell(k)
-            if (self%inverse%inside(i, j)) v%cells(1, k) = self%wanted(i, j)*self%rules%soft/self%unit_length
-         end do
-      end do
-      v%beside = level*self%root/self%unit_length
-   end subroutine improve
+      slip = self%c*self%rules%soft_along*self%contact%slip(i, :, j)
+   end function slip_of
 
    !> Copy the solution to the contact, and compute its errors.
    subroutine return_solution(system, found, task, outcome)
