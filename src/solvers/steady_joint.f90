@@ -27,7 +27,7 @@ module steady_joint
 
    public :: steady_joint_type
 
-   integer, parameter :: near_evaluations = 1000       !! largest number in an attempt from the present contact
+   integer, parameter :: near_evaluations = 300       !! largest number in an attempt from the present contact
    integer, parameter :: most_evaluations = 4000       !! largest number in any other attempt, ...
    real(dp), parameter :: large = 16384.0_dp           !! ... on grids of this number of cells
    real(dp), parameter :: most_on_small = 5.0_dp       !! factor by which it may be larger on smaller grids

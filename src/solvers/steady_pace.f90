@@ -35,7 +35,7 @@ module steady_pace
    integer, parameter :: patience = 25           !! least number of rounds between attempts from the present contact
    real(dp), parameter :: near_solution = 1.0e-3_dp  !! change below which an attempt from here usually succeeds
    real(dp), parameter :: almost = 5.0_dp        !! change, in tolerances, below which the rounds continue in any case
-   real(dp), parameter :: price = 1200.0_dp      !! transforms of such an attempt on a grid of ...
+   real(dp), parameter :: price = 900.0_dp      !! transforms of such an attempt on a grid of ...
    real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; they grow like its square root
 
    !> The pace of the rounds.
