@@ -21,11 +21,12 @@ module case_memory
    !> Fields of a step that is solved all at once: the equations and four states; and the directions of GMRES, if
    !> all cells touch.
    real(dp), parameter :: joint_fields = 30.0_dp, joint_directions = 180.0_dp
+   real(dp), parameter :: joint_inverse = 184.0_dp    !! the inverses of its tiles (module `joint_tiles`), if all cells touch
    !> The same of a steady row without friction.
    real(dp), parameter :: newton_fields = 11.0_dp, newton_directions = 50.0_dp
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
-   !> Further fields of a steady row: the approximate inverse, and the last two states on a path of solutions.
-   real(dp), parameter :: path_fields = 15.0_dp
+   !> Further fields of a steady row: the last two states on a path of solutions.
+   real(dp), parameter :: path_fields = 13.0_dp
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
@@ -86,8 +87,8 @@ contains
       steady = any(case%phases%steady)
       rubs = road_moves(case%phases) .and. case%friction%law /= 'none'
       fields = 0.0_dp
-      if (rubs .and. (in_time .or. steady)) fields = joint_fields + joint_directions
-      if (rubs .and. steady) fields = fields + path_fields + tile_fields
+      if (rubs .and. (in_time .or. steady)) fields = joint_fields + joint_directions + joint_inverse
+      if (rubs .and. steady) fields = fields + path_fields
       if (steady .and. .not. rubs) fields = newton_fields + tile_fields + newton_directions
       bytes = 8.0_dp*fields*real(case%grid%nx, dp)*real(case%grid%ny, dp)
    end function joint_memory
