@@ -205,7 +205,8 @@ contains
 
       call list_cells(self, system)
       cells = self%first(size(self%first)) - 1
-      before = rows_before(cells)
+      before = 0
+      if (system%grid%shared) before = rows_before(cells)
       if (allocated(step%cells)) deallocate (step%cells)
       allocate (step%cells(3, cells), stat=status(1))
       allocate (v%cells(3, cells), stat=status(2))
