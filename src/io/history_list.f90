@@ -44,7 +44,8 @@ contains
          'mean tangential traction on the rubber along x')
       call table%add(prefix//'traction_y', row%traction_y, 'Pa', &
          'mean tangential traction on the rubber along y')
-      call table%add(prefix//'stick_area', row%stick_area, '1', 'fraction of the grid that sticks')
+      call table%add(prefix//'stick_area', row%stick_area, '1', &
+         'fraction of the grid that sticks: its slip cannot be told from none')
       call table%add(prefix//'sliding_speed', row%sliding_speed, 'm/s', &
          'mean speed of the road over the rubber''s surface along the road''s velocity')
       call table%add(prefix//'friction_viscous', row%friction_viscous, '1', &

@@ -21,12 +21,12 @@ module friction_books
    use contact_rule, only : touches
    use field_sums, only : field_count, row_totals
    use friction_fields, only : friction_fields_type
-   use friction_law, only : contact_open, contact_stick, friction_law_type, unbounded
+   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, unbounded
    use tangential_state, only : tangential_state_type
    implicit none
    private
 
-   public :: book_friction, book_rest, rubbed_type
+   public :: book_friction, book_rest, mark_idle, rubbed_type
 
    !> Sums over the cells.
    type :: rubbed_type
@@ -77,6 +77,23 @@ contains
       total = row_totals(rows)
       rubbed = rubbed_type(total(1), total(2:3), total(4))
    end subroutine book_friction
+
+   !> Mark cells as sticking that are on their bound, but whose slip is not larger than the error of the solver may be.
+   !> Which of the two states the solver assigns to such a cell is round-off: for example when the road has stopped.
+   subroutine mark_idle(state, slip, least)
+      type(tangential_state_type), intent(inout) :: state
+      real(dp), intent(in) :: slip(:, :, :)           !! m [nx, 2, rows]
+      real(dp), intent(in) :: least                   !! slip that the solver can tell from none, m
+      integer :: i, j
+
+      !$omp parallel do default(none) shared(state, slip, least) private(i, j)
+      do j = 1, size(slip, 3)
+         do i = 1, size(slip, 1)
+            if (state%contact(i, j) == contact_slip .and. norm2(slip(i, :, j)) <= least) &
+               state%contact(i, j) = contact_stick
+         end do
+      end do
+   end subroutine mark_idle
 
    !> Note the forces of the law in a contact without friction, because the road has not moved yet.
    subroutine book_rest(state, law, adhesive, pressure, gap, slope_x, slope_y)

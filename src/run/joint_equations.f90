@@ -106,17 +106,19 @@ contains
    subroutine find_responses(self, contact)
       type(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
-      real(dp), allocatable :: load(:, :), u(:, :), shear(:, :, :)
+      real(dp), allocatable :: load(:, :), u(:, :), traction(:, :, :), shear(:, :, :)
       integer :: c, k, nx, ny
 
       nx = self%grid%nx
       ny = self%grid%rows()
-      allocate (load(nx, ny), u(nx, ny), shear(nx, ny, 2), source=0.0_dp)
+      allocate (load(nx, ny), u(nx, ny), traction(nx, ny, 2), shear(nx, ny, 2), source=0.0_dp)
       if (self%grid%first_row == 1 .and. ny > 0) load(1, 1) = 1.0_dp
       call self%operator%apply(load, u)
       self%near%depth = near_values(self%grid, u, even)/contact%material%q
       do c = 1, 2
-         call contact%tangential%respond(load, c, shear)
+         traction = 0.0_dp
+         traction(:, :, c) = load
+         call contact%tangential%respond(traction, shear)
          do k = 1, 2
             self%near%place(k, c, :, :) = near_values(self%grid, shear(:, :, k), merge(even, odd, k == c))
          end do

@@ -14,7 +14,7 @@ module tangential_step
    use adhesion_potential, only : adhesion_potential_type, adhesive_slope, new_adhesion_potential
    use case_settings, only : case_type
    use asperity_errors, only : error_type
-   use friction_books, only : book_friction, book_rest, rubbed_type
+   use friction_books, only : book_friction, book_rest, mark_idle, rubbed_type
    use field_sums, only : field_count, vector_sum
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
@@ -318,21 +318,13 @@ contains
       compliance = self%compliance/self%q
    end function cell_compliance
 
-   !> Compute the change of the trial displacement by a traction along one direction: four transforms.
-   subroutine respond(self, traction, along, change)
+   !> Compute the change of the trial displacement with the traction: four transforms.
+   subroutine respond(self, traction, change)
       class(tangential_step_type), intent(inout) :: self
-      real(dp), intent(in) :: traction(:, :)          !! [nx, rows] Pa
-      integer, intent(in) :: along                    !! 1: x, 2: y
+      real(dp), intent(in) :: traction(:, :, :)       !! Pa [nx, rows, 2]
       real(dp), intent(inout) :: change(:, :, :)      !! m [nx, rows, 2]
-      real(dp), allocatable :: other(:, :)
 
-      allocate (other, mold=traction)
-      other = 0.0_dp
-      if (along == 1) then
-         call self%operator%apply_vector(traction, other, change(:, :, 1), change(:, :, 2))
-      else
-         call self%operator%apply_vector(other, traction, change(:, :, 1), change(:, :, 2))
-      end if
+      call self%operator%apply_vector(traction(:, :, 1), traction(:, :, 2), change(:, :, 1), change(:, :, 2))
       change = change/self%q
    end subroutine respond
 
@@ -354,7 +346,7 @@ contains
          call book_rest(state, self%law, self%adhesive, pressure, gap, slope_x, slope_y)
          return
       end if
-      call mark_idle(self, state)
+      call mark_idle(state, self%slip, self%solver%resolved_slip/self%q)
       products = new_products(material)
       carried = 0.0_dp
       if (state%block%mass > 0.0_dp) then
@@ -380,24 +372,6 @@ contains
       if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%motion/(rubbed%cells*self%dt)
       state%displacement(:, :, :) = self%trial
    end subroutine commit
-
-   !> Mark cells as sticking that are on their bound, but whose slip is not larger than the error of the solver may be.
-   !> Which of the two states the solver assigns to such a cell is round-off: for example when the road has stopped.
-   subroutine mark_idle(self, state)
-      type(tangential_step_type), intent(in) :: self
-      type(tangential_state_type), intent(inout) :: state
-      real(dp) :: least
-      integer :: i, j
-
-      least = self%solver%resolved_slip/self%q
-      !$omp parallel do default(none) shared(self, state, least) private(i, j)
-      do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            if (state%contact(i, j) == contact_slip .and. norm2(self%slip(i, :, j)) <= least) &
-               state%contact(i, j) = contact_stick
-         end do
-      end do
-   end subroutine mark_idle
 
    !> Compute the mean traction, the fraction of the grid that sticks, and the mean slip of the step.
    subroutine sums(self, state, traction, stick, slip)

@@ -2,15 +2,14 @@
 !> (module `joint_system`).
 !>
 !> Newton's steps are computed by GMRES, whose products with the derivative of the equations are finite differences. An
-!> approximate inverse of the system (module `joint_system`) is applied before each product, so that GMRES measures the
-!> true residual.
-!> They are shortened if they do not reduce the residual. The gaps of open cells are not unknowns, but follow from the
+!> approximate inverse (module `joint_system`) is applied before each product, so that GMRES measures the true residual.
+!> The steps are shortened if they do not reduce the residual. The gaps of open cells are not unknowns, but follow from the
 !> other unknowns (with adhesion only those of cells that are hardly attracted). If the method fails and a traction may
 !> jump, the equations are regularised: the pressure rises slightly with s in partly sheared cells, which removes the
 !> jump. This rise is then reduced to zero (`reduce_rise`).
 !>
-!> Memory: 25 fields of doubles, and the directions of GMRES with 3 numbers in single precision per unknown cell
-!> and direction. If there is not enough memory, nothing is solved.
+!> Memory: 25 fields of doubles, the directions of GMRES with 3 numbers in single precision per unknown cell
+!> and direction, and the approximate inverse. If there is not enough memory, nothing is solved.
 module joint_newton
    use adhesion_potential, only : adhesive_curvature
    use asperity_parallel, only : any_process, rows_before

@@ -147,10 +147,13 @@ contains
          derivative(k) = new_cell_derivative(self%rules, cells(k), self%unit_length, self%unit_traction)
       end do
       deallocate (cells)
-      call self%tiles%renew(self%grid, first, cell, derivative, self%near, [self%unit_length, self%unit_traction])
+      call self%tiles%renew(self%grid, first, cell, derivative, self%near, [self%unit_length, self%unit_traction], done)
+      if (.not. done) return
 
       if (allocated(self%lift)) deallocate (self%lift)
-      allocate (self%lift(3, size(self%tiles%derivative)), source=0.0_dp)
+      allocate (self%lift(3, size(self%tiles%derivative)), source=0.0_dp, stat=status(1))
+      done = .not. any_process(status(1) /= 0)
+      if (.not. done) return
       self%lift(1, :) = 1.0_dp
       call self%tiles%apply(self%lift)
       self%lift_pressure = self%mean_pressure(self%lift)

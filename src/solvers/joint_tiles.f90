@@ -11,7 +11,7 @@
 !> Memory: the inverses in single precision, at most 162 doubles per cell in the list, and 22 doubles per cell while they
 !> are made. Where there is no memory for the inverse of a tile, its residuals remain as they are.
 module joint_tiles
-   use asperity_parallel, only : gather_rows, global_sum
+   use asperity_parallel, only : any_process, gather_rows, global_sum
    use asperity_precision, only : dp, sp
    use cell_derivative, only : cell_derivative_type, numbers_per_derivative
    use cell_tiles, only : tile_cells_type, tile_layout_type, tile_rim
@@ -80,21 +80,27 @@ contains
       if (grid%shared) near = reshape(global_sum(reshape(near, [size(near)])), shape(near))
    end function near_values
 
-   !> Make the inverses for a list of cells.
-   subroutine renew(self, grid, first, cell, derivative, near, scale)
+   !> Make the inverses for a list of cells. `done` is .false. if there is no memory for the list.
+   subroutine renew(self, grid, first, cell, derivative, near, scale, done)
       class(joint_tiles_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: first(:)            !! [rows + 1] the first cell of each row in the list
       integer, intent(in) :: cell(:)             !! the cells of the list, i
-      type(cell_derivative_type), intent(in) :: derivative(:)    !! of the cells of this process
+      !> of the cells of this process; out: not allocated
+      type(cell_derivative_type), allocatable, intent(inout) :: derivative(:)
       type(cell_responses_type), intent(in) :: near
       real(dp), intent(in) :: scale(2)           !! units of length and traction, m and Pa
-      integer :: number(grid%nx, grid%ny)        !! of each cell of the grid in the list; 0: not in it
-      integer :: t
+      logical, intent(out) :: done
+      integer, allocatable :: number(:, :)       !! of each cell of the grid in the list; 0: not in it
+      integer :: status, t
       logical :: changed
 
       self%layout = tile_layout_type(side, [grid%nx, grid%ny], grid%shared, grid%boundary == boundary_periodic)
-      call gather_cells(self, grid, first, cell, derivative, number)
+      allocate (number(grid%nx, grid%ny), source=0, stat=status)
+      done = .not. any_process(status /= 0)
+      if (.not. done) return
+      call number_cells(self, grid, first, cell, derivative, number)
+
       if (allocated(self%tile)) deallocate (self%tile)
       allocate (self%tile(product(self%layout%tiles)))
       !$omp parallel do default(none) shared(self, number, near, scale) private(t, changed) schedule(dynamic)
@@ -105,15 +111,25 @@ contains
       end do
    end subroutine renew
 
-   !> Collect the derivatives of the cells of all processes, and number the cells.
-   subroutine gather_cells(self, grid, first, cell, derivative, number)
+   !> Number the cells of all processes, and collect their derivatives.
+   subroutine number_cells(self, grid, first, cell, derivative, number)
       type(joint_tiles_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
       integer, intent(in) :: first(:), cell(:)
-      type(cell_derivative_type), intent(in) :: derivative(:)
-      integer, intent(out) :: number(:, :)
+      type(cell_derivative_type), allocatable, intent(inout) :: derivative(:)
+      integer, intent(inout) :: number(:, :)
       real(dp), allocatable :: here(:, :)
       integer :: j, k, n
+
+      if (.not. grid%shared) then
+         do j = 1, size(first) - 1
+            do k = first(j), first(j + 1) - 1
+               number(cell(k), j) = k
+            end do
+         end do
+         call move_alloc(derivative, self%derivative)
+         return
+      end if
 
       allocate (here(2 + numbers_per_derivative, size(derivative)))
       do j = 1, size(first) - 1
@@ -121,16 +137,15 @@ contains
             here(:, k) = [real([cell(k), grid%first_row - 1 + j], dp), derivative(k)%packed()]
          end do
       end do
-      if (grid%shared) here = gather_rows(here)
-
-      number = 0
+      here = gather_rows(here)
+      deallocate (derivative)
       if (allocated(self%derivative)) deallocate (self%derivative)
       allocate (self%derivative(size(here, 2)))
       do n = 1, size(here, 2)
          number(nint(here(1, n)), nint(here(2, n))) = n
          call self%derivative(n)%unpack(here(3:, n))
       end do
-   end subroutine gather_cells
+   end subroutine number_cells
 
    !> Make the inverse of a tile, if there is memory for it.
    subroutine invert_tile(tile, derivative, near, scale)
