@@ -8,6 +8,8 @@ road per area of the road.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.interpolate import RectBivariateSpline
@@ -273,3 +275,53 @@ def test_a_returned_road_under_stick_converges(tmp_path):
     touching = run.snapshots[-1].contact > 0
     assert np.abs(run.snapshots[-1].displacement_x[touching]).max() < 1e-8 * far
     assert np.abs(history["traction_x"][-1]) > 1e-3 * np.abs(history["traction_x"]).max()
+
+
+def test_the_work_of_a_first_short_step_is_that_of_the_drive(tmp_path: Path) -> None:
+    """The road moves by 20 nm, so that its drive does hardly any work.
+
+    The contact was pressed without friction. The energy that its slopes set free as soon as
+    friction acts is lost by friction, and is not work that the drive gets back.
+    """
+    case = tmp_path / "first.nml"
+    case.write_text(f"""&grid nx = 48, ny = 1, lx = 1e-3 /
+&surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.32, seed = 7,
+   wavelength_short = 8.34e-05, wavelength_long = 1e-3 /
+&material shear_modulus = 1e6, poisson = 0.5, thickness = 0.005 /
+&friction law = 'coulomb', coefficient = 0.32 /
+&phase pressure = 6e5 /
+&phase duration = 2e-8, steps = 1, velocity_x = 1.0 /
+&solver threads = 1, tolerance = 1e-8 /
+&output file = '{tmp_path / "first.h5"}' /
+""")
+    history = asperity.run(case, quiet=True).history
+    assert history["dissipated_friction"][-1] > 2e-9
+    assert abs(history["work_drive"][-1]) < 0.01 * history["dissipated_friction"][-1]
+
+
+def test_cells_with_little_pressure_are_solved_too(tmp_path: Path) -> None:
+    """The losses of all rows are those of a much finer solve.
+
+    A cell that has just come into contact carries so little that means weighted by the pressure do
+    not show whether its pressure is right.
+    """
+    text = """&grid nx = 16, ny = 16, lx = 0.001, ly = 0.001 /
+&surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.32762288411287727, seed = 158242,
+   wavelength_short = 0.00025, wavelength_long = 0.001 /
+&material shear_modulus = 1e6, poisson = 0.4512338907237527, thickness = 0.005 /
+&friction law = 'coulomb_orowan', coefficient = 1.1022242209424329,
+   shear_strength = 1180711.581939717 /
+&phase pressure = 478912.96510808164, relaxed = .true. /
+&phase duration = 0.0003679502851841825, steps = 9, velocity_x = 1.0 /
+&phase duration = 0.0004668001049918613, steps = 10, velocity_x = 0.0 /
+&solver threads = 1, tolerance = {tolerance}, time_scheme = 'backward_euler' /
+&output file = '{file}' /
+"""
+    losses = []
+    for tolerance in (1e-6, 1e-9):
+        case = tmp_path / "light.nml"
+        file = tmp_path / f"light_{tolerance}.h5"
+        case.write_text(text.format(tolerance=tolerance, file=file))
+        losses.append(np.diff(asperity.run(case, quiet=True).history["dissipated_friction"]))
+    scale = np.maximum(losses[1], 1e-3 * losses[1].max())
+    assert (np.abs(losses[0] - losses[1]) < 0.01 * scale).all()

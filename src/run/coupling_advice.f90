@@ -27,9 +27,13 @@ contains
             'solution exists; law = ''coulomb_orowan'', whose bound grows with the pressure from zero, usually '// &
             'settles with a coefficient of up to about 1'
       else if (jammed > much) then
-         advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above '// &
-            '1/coefficient, where friction can resist any uphill force, so that there may be no solution: use a '// &
-            'smoother road or a lower coefficient'
+         advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above 1/coefficient, where '
+         if (self%tangential%law%strength_beside() < 0.0_dp) then
+            advice = advice//'friction can resist any uphill force, so that there may be no solution'
+         else
+            advice = advice//'only the strength limits an uphill force: a solution exists, but the passes did not find it'
+         end if
+         advice = advice//': use a smoother road or a lower coefficient'
       else if (self%case%solver%passes > 0) then
          advice = 'Allow more passes (with passes = 0 they continue until they settle), or a larger '// &
             'coupling_tolerance'

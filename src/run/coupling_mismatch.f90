@@ -2,10 +2,11 @@
 !> found, and the road on which it was solved.
 !>
 !> It is the largest of three numbers. Two are means that are weighted by the pressure: the difference of the heights
-!> divided by the rms height of the map, and that of the slopes divided by the slopes in the contact. The third shows
-!> cells that should carry more pressure, or any: the sum of the lengths by which the road at U_T overlaps the surface,
-!> divided by the number of cells with pressure and by the rms height. The means hardly contain these cells. With
-!> constant shear a cell with hardly any pressure carries as much traction as any other, and none of these shows whether
+!> divided by the rms height of the map, and that of the slopes divided by the slopes in the contact. The means hardly
+!> contain cells that carry little pressure, or none although they should. The third number shows these: the sum of the
+!> lengths by which the road at U_T overlaps the surface or leaves it, divided by the number of cells with pressure and by
+!> the rms height. A cell that the road leaves counts at most with the length by which its own pressure compresses it,
+!> since it then opens. With constant shear a cell with hardly any pressure carries as much traction as any other, and none of these shows whether
 !> it obeys the law. In that case the sum of the errors of all cells (module `edge_shares`) counts as well.
 !>
 !> Outside the contact U_T may differ much from the place at which the road was read, because nothing there depends on
@@ -38,7 +39,7 @@ contains
       real(dp) :: mismatch
       real(dp), pointer, contiguous :: height(:, :), slope_x(:, :), slope_y(:, :)     ! of the road at U_T
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: sums(6), edges
+      real(dp) :: sums(6), edges, compliance
       integer :: j
 
       call contact%work%lend('height at U_T', height)
@@ -46,10 +47,11 @@ contains
       call contact%work%lend('slope along y at U_T', slope_y)
       call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
          contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
+      compliance = contact%tangential%cell_compliance()
       allocate (rows(size(sums), contact%grid%rows()))
-      !$omp parallel do default(none) shared(contact, height, slope_x, slope_y, rows) private(j)
+      !$omp parallel do default(none) shared(contact, compliance, height, slope_x, slope_y, rows) private(j)
       do j = 1, contact%grid%rows()
-         call compare_row(contact, j, height(:, j), slope_x(:, j), slope_y(:, j), rows(:, j))
+         call compare_row(contact, j, compliance, height(:, j), slope_x(:, j), slope_y(:, j), rows(:, j))
       end do
       sums = row_totals(rows)
       edges = 0.0_dp
@@ -71,12 +73,13 @@ contains
    end function mismatch_of
 
    !> Compare the road of a pass with that at U_T along a row, and put the cells without pressure over the latter.
-   pure subroutine compare_row(contact, j, height, slope_x, slope_y, sums)
+   pure subroutine compare_row(contact, j, compliance, height, slope_x, slope_y, sums)
       class(contact_type), intent(inout) :: contact
       integer, intent(in) :: j
+      real(dp), intent(in) :: compliance               !! of a cell, m/Pa
       real(dp), intent(in) :: height(:), slope_x(:), slope_y(:)     !! of the road at U_T
       !> Sums of the pressure; with the pressure as weight, of the differences in height and in slope, and of the slope;
-      !> of the overlaps; and the number of cells with pressure.
+      !> of the overlaps and of the lengths by which the road leaves cells; and the number of cells with pressure.
       real(dp), intent(out) :: sums(6)
       real(dp) :: p
       integer :: i
@@ -88,6 +91,7 @@ contains
          if (p > 0.0_dp) then
             sums(1) = sums(1) + p
             sums(2) = sums(2) + p*abs(height(i) - contact%height(i, j))
+            sums(5) = sums(5) + min(compliance*p, max(contact%height(i, j) - height(i), 0.0_dp))
             ! Slopes are of the order of one, so that their squares need no care; hypot would take several times longer.
             sums(3) = sums(3) + p*sqrt((slope_x(i) - contact%slope_x(i, j))**2 &
                + (slope_y(i) - contact%slope_y(i, j))**2)

@@ -95,7 +95,8 @@ contains
       end do
    end subroutine mark_idle
 
-   !> Note the forces of the law in a contact without friction, because the road has not moved yet.
+   !> Note the frictional tractions and the forces of the law in a contact without friction, because the road has not
+   !> moved yet. T = 0 there, so that d = -T*.
    subroutine book_rest(state, law, adhesive, pressure, gap, slope_x, slope_y)
       type(tangential_state_type), intent(inout) :: state
       type(friction_law_type), intent(in) :: law
@@ -103,14 +104,18 @@ contains
       real(dp), intent(in) :: pressure(:, :)          !! [nx, rows] Pa
       real(dp), intent(in) :: gap(:, :)               !! m
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
+      real(dp) :: slope(2)
       integer :: i, j
 
-      !$omp parallel do default(none) shared(state, law, adhesive, pressure, gap, slope_x, slope_y) private(i, j)
+      !$omp parallel do default(none) shared(state, law, adhesive, pressure, gap, slope_x, slope_y) private(i, j, slope)
       do j = 1, size(pressure, 2)
          do i = 1, size(pressure, 1)
             state%force(i, j) = 0.0_dp
-            if (touches(adhesive, pressure(i, j), gap(i, j))) state%force(i, j) = &
-               law%friction_force(pressure(i, j), [slope_x(i, j), slope_y(i, j)], [1.0_dp, 1.0_dp])
+            state%rubbing(i, :, j) = 0.0_dp
+            if (.not. touches(adhesive, pressure(i, j), gap(i, j))) cycle
+            slope = [slope_x(i, j), slope_y(i, j)]
+            state%force(i, j) = law%friction_force(pressure(i, j), slope, [1.0_dp, 1.0_dp])
+            state%rubbing(i, :, j) = -law%normal_traction(pressure(i, j), slope)
          end do
       end do
    end subroutine book_rest
