@@ -53,8 +53,14 @@ contains
       call check_close(row%work_load, 12.5_dp, 1e-14_dp, 'a jump works what it stores')
       row%work_load = 10.0_dp
       call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .true., .false., row)
-      call check_close(row%work_drive, 2.5_dp - 3.0_dp, 1e-14_dp, 'the first step of a motion: drive')
-      call check_close(row%work_missing, 0.0_dp, 0.0_dp, 'the first step of a motion: balance')
+      ! The fields store and lose 3 less than the load gives, but a force of 1 to 2 works 2 to 4 on the way of 2.
+      call check_close(row%work_drive, 2.0_dp, 1e-14_dp, 'the first step of a motion: least work of the drive')
+      call check_close(row%work_missing, 2.5_dp, 1e-14_dp, 'the first step of a motion: the rest is missing')
+      row%work_normal = 6.5_dp
+      row%work_missing = 0.0_dp
+      call book_outside(before, [1.0_dp, 0.0_dp], [2.0_dp, 7.0_dp], [0.0_dp, 0.0_dp], .false., .true., .false., row)
+      call check_close(row%work_drive, 3.5_dp, 1e-14_dp, 'the first step of a motion: drive')
+      call check_close(row%work_missing, 0.0_dp, 1e-14_dp, 'the first step of a motion: balance')
    end subroutine excess_and_radiation_of_one_row
 
    !> Mindlin's sphere moved back and forth, nu = 0. The energy lost in a loop is the area of the exact loop

@@ -281,7 +281,7 @@ def test_the_work_of_a_first_short_step_is_that_of_the_drive(tmp_path: Path) -> 
     """The road moves by 20 nm, so that its drive does hardly any work.
 
     The contact was pressed without friction. The energy that its slopes set free as soon as
-    friction acts is lost by friction, and is not work that the drive gets back.
+    friction acts is lost by friction or missing, and is not work that the drive gets back.
     """
     case = tmp_path / "first.nml"
     case.write_text(f"""&grid nx = 48, ny = 1, lx = 1e-3 /
@@ -295,8 +295,8 @@ def test_the_work_of_a_first_short_step_is_that_of_the_drive(tmp_path: Path) -> 
 &output file = '{tmp_path / "first.h5"}' /
 """)
     history = asperity.run(case, quiet=True).history
-    assert history["dissipated_friction"][-1] > 2e-9
-    assert abs(history["work_drive"][-1]) < 0.01 * history["dissipated_friction"][-1]
+    assert history["dissipated_friction"][-1] > 1e-9
+    assert abs(history["work_drive"][-1]) < 1e-4 * history["dissipated_friction"][-1]
 
 
 def test_cells_with_little_pressure_are_solved_too(tmp_path: Path) -> None:

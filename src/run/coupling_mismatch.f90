@@ -4,10 +4,11 @@
 !> It is the largest of three numbers. Two are means that are weighted by the pressure: the difference of the heights
 !> divided by the rms height of the map, and that of the slopes divided by the slopes in the contact. The means hardly
 !> contain cells that carry little pressure, or none although they should. The third number shows these: the sum of the
-!> lengths by which the road at U_T overlaps the surface or leaves it, divided by the number of cells with pressure and by
-!> the rms height. A cell that the road leaves counts at most with the length by which its own pressure compresses it,
-!> since it then opens. With constant shear a cell with hardly any pressure carries as much traction as any other, and none of these shows whether
-!> it obeys the law. In that case the sum of the errors of all cells (module `edge_shares`) counts as well.
+!> lengths by which the road at U_T overlaps the surface or leaves it, divided by the number of cells with pressure and
+!> by the rms height. A cell that the road leaves counts at most with the length by which its own pressure compresses
+!> it, since it then opens. With constant shear a cell with hardly any pressure carries as much traction as any other,
+!> and none of these shows whether it obeys the law. In that case the sum of the errors of all cells (module
+!> `edge_shares`) counts as well.
 !>
 !> Outside the contact U_T may differ much from the place at which the road was read, because nothing there depends on
 !> it. Cells without pressure therefore get the road at U_T, and their gap over it. U_z and the solves are not changed.

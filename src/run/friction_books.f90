@@ -96,7 +96,7 @@ contains
    end subroutine mark_idle
 
    !> Note the frictional tractions and the forces of the law in a contact without friction, because the road has not
-   !> moved yet. T = 0 there, so that d = -T*.
+   !> moved yet. T = 0 there, so that d = -T*, returned to the bound where the law does not allow so much.
    subroutine book_rest(state, law, adhesive, pressure, gap, slope_x, slope_y)
       type(tangential_state_type), intent(inout) :: state
       type(friction_law_type), intent(in) :: law
@@ -104,18 +104,20 @@ contains
       real(dp), intent(in) :: pressure(:, :)          !! [nx, rows] Pa
       real(dp), intent(in) :: gap(:, :)               !! m
       real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)
-      real(dp) :: slope(2)
+      real(dp) :: d(2), slope(2)
+      real(dp), parameter :: whole(2) = 1.0_dp
       integer :: i, j
 
-      !$omp parallel do default(none) shared(state, law, adhesive, pressure, gap, slope_x, slope_y) private(i, j, slope)
+      !$omp parallel do default(none) shared(state, law, adhesive, pressure, gap, slope_x, slope_y) private(i, j, d, slope)
       do j = 1, size(pressure, 2)
          do i = 1, size(pressure, 1)
             state%force(i, j) = 0.0_dp
             state%rubbing(i, :, j) = 0.0_dp
             if (.not. touches(adhesive, pressure(i, j), gap(i, j))) cycle
             slope = [slope_x(i, j), slope_y(i, j)]
-            state%force(i, j) = law%friction_force(pressure(i, j), slope, [1.0_dp, 1.0_dp])
-            state%rubbing(i, :, j) = -law%normal_traction(pressure(i, j), slope)
+            state%force(i, j) = law%friction_force(pressure(i, j), slope, whole)
+            d = -law%normal_traction(pressure(i, j), slope)
+            state%rubbing(i, :, j) = min(law%ratio_under(state%force(i, j), slope, d, whole), 1.0_dp)*d
          end do
       end do
    end subroutine book_rest

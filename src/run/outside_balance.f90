@@ -16,7 +16,9 @@
 !>
 !> If friction acts, the trapezoidal rule does not apply to the drive in the first step of a motion. On a half-space the
 !> whole contact may slip after a small part of this step, with the force at its final value from then on; the mean of
-!> both ends would be half of that. The work of the drive is then set equal to what the fields store and lose.
+!> both ends would be half of that. The work of the drive is then set equal to what the fields store and lose, but it
+!> lies between the works that the forces at both ends would do. What is left is missing: a contact that was pressed
+!> without friction sets energy free where it is steeper than the law of friction allows.
 module outside_balance
    use history_row, only : history_row_type
    use asperity_precision, only : dp
@@ -37,7 +39,7 @@ contains
       logical, intent(in) :: kinked                  !! the first step of a motion with friction
       logical, intent(in) :: adhesive
       type(history_row_type), intent(inout) :: row
-      real(dp) :: inside, excess, margin, motion(2), sunk
+      real(dp) :: inside, excess, margin, motion(2), sunk, driven(2), work
 
       inside = row%work_normal - before%work_normal + row%work_tangential - before%work_tangential
       if (abrupt) then
@@ -48,14 +50,13 @@ contains
       sunk = row%displacement - before%displacement
       motion = [row%road_x - before%road_x, row%road_y - before%road_y]
       row%work_load = before%work_load + 0.5_dp*(before%force + row%force)*sunk
-      if (kinked .and. any(abs(motion) > 0.0_dp)) then
-         row%work_drive = before%work_drive + inside - (row%work_load - before%work_load)
-         return
-      end if
-      row%work_drive = before%work_drive + dot_product(0.5_dp*(drive_before + drive) - inertia, motion)
+      driven = [dot_product(drive_before - inertia, motion), dot_product(drive - inertia, motion)]
+      work = 0.5_dp*sum(driven)
+      if (kinked) work = min(max(inside - (row%work_load - before%work_load), minval(driven)), maxval(driven))
+      row%work_drive = before%work_drive + work
 
-      excess = row%work_load - before%work_load + row%work_drive - before%work_drive - inside
-      margin = 0.5_dp*(abs((row%force - before%force)*sunk) + abs(dot_product(drive - drive_before, motion)))
+      excess = row%work_load - before%work_load + work - inside
+      margin = 0.5_dp*(abs((row%force - before%force)*sunk) + abs(driven(2) - driven(1)))
       if (adhesive .and. excess > margin) then
          row%energy_radiated = before%energy_radiated + excess
       else
