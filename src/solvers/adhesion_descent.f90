@@ -47,7 +47,7 @@ contains
    !> been measured. After steps that failed, or of which hardly anything could be taken, the step is shorter, until as
    !> many steps have succeeded.
    subroutine approach_minimum(work, now)
-      type(adhesion_work_type), intent(inout) :: work
+      type(adhesion_work_type), intent(inout), target :: work
       type(adhesion_iteration_type), intent(inout) :: now
       type(adhesion_iteration_type) :: inner
       real(dp) :: largest

@@ -24,8 +24,8 @@ module adhesion_work
       real(dp), allocatable :: old(:, :)             !! r of the iteration before
       real(dp), allocatable :: direction(:, :)       !! d
       ! The contact in the local model of its energy:
-      real(dp), pointer, contiguous :: model_state(:, :) => null()
-      real(dp), pointer, contiguous :: model_traction(:, :) => null()
+      real(dp), allocatable :: model_state(:, :)
+      real(dp), allocatable :: model_traction(:, :)
       !> Change of the displacement, or its correction where gaps were closed. The rows of other processes that the
       !> stencil needs follow those of this process.
       real(dp), allocatable :: change(:, :)
