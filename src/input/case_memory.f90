@@ -21,7 +21,7 @@ module case_memory
    !> Fields of a step that is solved all at once: the equations and four states; and the directions of GMRES, if
    !> all cells touch.
    real(dp), parameter :: joint_fields = 30.0_dp, joint_directions = 180.0_dp
-   real(dp), parameter :: joint_inverse = 184.0_dp    !! the inverses of its tiles (module `joint_tiles`), if all cells touch
+   real(dp), parameter :: joint_inverse = 205.0_dp    !! the inverses of its tiles (module `joint_tiles`), if all cells touch
    !> The same of a steady row without friction.
    real(dp), parameter :: newton_fields = 11.0_dp, newton_directions = 50.0_dp
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row

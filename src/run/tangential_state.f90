@@ -27,7 +27,7 @@ module tangential_state
       type(block_motion_type) :: block                !! mean motion of the block
       real(dp), allocatable :: traction(:, :, :)      !! T, Pa [nx, 2, rows]
       real(dp), allocatable :: before(:, :, :)        !! T of the step before, carried along with the contact, Pa
-      real(dp) :: pace = 0.0_dp                       !! length of the step from `before` to T, s; 0 if none
+      real(dp) :: last_dt = 0.0_dp                    !! length of the step from `before` to T, s; 0 if none
       real(dp), allocatable :: displacement(:, :, :)  !! U_T, m
       real(dp), allocatable :: rubbing(:, :, :)       !! T - T* at the end of the last step, Pa
       integer(int8), allocatable :: contact(:, :)     !! 0 open, 1 stick, 2 slip
@@ -73,7 +73,7 @@ contains
       integer :: i, j
 
       factor = 0.0_dp
-      if (changes) factor = dt/self%pace
+      if (changes) factor = dt/self%last_dt
       !$omp parallel do default(none) shared(self, factor) private(i, j, t)
       do j = 1, size(self%contact, 2)
          do i = 1, size(self%contact, 1)
@@ -82,7 +82,7 @@ contains
             self%before(i, :, j) = t
          end do
       end do
-      self%pace = dt
+      self%last_dt = dt
    end subroutine extrapolate
 
 end module tangential_state

@@ -130,8 +130,8 @@ contains
       ! If the road returns to where it began, only round-off is left of the displacements. The least scale keeps it from
       ! being the scale of the residual.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
-      if (.not. dt > 0.0_dp) state%pace = 0.0_dp
-      self%starts = .not. state%pace > 0.0_dp
+      if (.not. dt > 0.0_dp) state%last_dt = 0.0_dp
+      self%starts = .not. state%last_dt > 0.0_dp
       call past_traction(state%arms, material, self%past)
       self%past_mean = means(self, self%past)
       mean = 0.0_dp
@@ -204,7 +204,7 @@ contains
       type(tangential_state_type), intent(inout) :: state
       logical, intent(in) :: steady                   !! the road moves as in the step before
 
-      self%solver%near = steady .and. state%pace > 0.0_dp .and. self%dt > 0.0_dp
+      self%solver%near = steady .and. state%last_dt > 0.0_dp .and. self%dt > 0.0_dp
       call state%extrapolate(self%dt, self%solver%near)
    end subroutine extrapolate
 

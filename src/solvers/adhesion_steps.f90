@@ -119,10 +119,10 @@ contains
    end function sum_shift
 
    !> Form the sums for a row of the step s that do not need B s.
-   subroutine form_step_row(problem, gap, wall, s, sums)
+   subroutine form_step_row(problem, gap, pressure, s, sums)
       type(adhesion_problem_type), intent(in) :: problem
       real(dp), intent(in), contiguous :: gap(:)       !! g, m
-      real(dp), intent(in), contiguous :: wall(:)      !! G - e', Pa
+      real(dp), intent(in), contiguous :: pressure(:)  !! P = G - e', Pa
       real(dp), intent(in), contiguous :: s(:)         !! m
       type(step_sums_type), intent(out) :: sums
       real(dp) :: slope, adhesive, curvature, energy
@@ -135,7 +135,7 @@ contains
       energy = 0.0_dp
       call adhesive_slopes(problem%potential, gap, e1, e2, e)
       do i = 1, size(gap)
-         slope = slope + (wall(i) + e1(i))*s(i)
+         slope = slope + (pressure(i) + e1(i))*s(i)
          adhesive = adhesive + s(i)*e1(i)
          curvature = curvature + s(i)**2*e2(i)
          energy = energy + e(i)

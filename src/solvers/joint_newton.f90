@@ -25,9 +25,8 @@ module joint_newton
    public :: joint_newton_type
 
    integer, parameter :: most_steps = 25
-   integer, parameter :: few_steps = 3                 !! steps that must halve the residual if the method is `hasty`
    integer, parameter :: most_directions = 120         !! directions of GMRES for a step
-   real(dp), parameter :: accuracy = 1.0e-4_dp         !! of a solve by GMRES
+   real(dp), parameter :: accuracy = 1.0e-3_dp         !! of a solve by GMRES
    real(dp), parameter :: far = 0.1_dp                 !! residual from which `far_accuracy` is sufficient
    real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
    !> If |e''| over the stiffness of a cell is larger, the gap of an open cell is an unknown.
@@ -48,7 +47,9 @@ module joint_newton
    type :: joint_newton_type
       logical :: ready = .false.
       real(dp) :: far_accuracy = accuracy              !! of a solve by GMRES far from the solution
-      logical :: hasty = .false.                       !! give up if the residual falls slowly, and do not try a rise
+      !> Number of steps in which the residual must be halved; otherwise the solve ends without trying a rise. 0: the
+      !> residual may fall slowly.
+      integer :: steps_to_halve = 0
       type(joint_state_type) :: now                    !! in: the start; out: the solution
       integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
       integer, allocatable, private :: cell(:)         !! its cells, i
@@ -92,7 +93,7 @@ contains
       goal = max(part_of_tolerance*tolerance, round_off)
       call self%begun%copy(self%now)
       call iterate(self, system, goal, solved)
-      if (.not. solved .and. .not. self%hasty .and. field_count(system%width > 0.0_dp) > 0) &
+      if (.not. solved .and. self%steps_to_halve == 0 .and. field_count(system%width > 0.0_dp) > 0) &
          call reduce_rise(self, system, goal, solved)
    end subroutine solve
 
@@ -121,16 +122,27 @@ contains
       do k = 1, most_steps
          if (.not. self%now%worst > goal .or. self%now%merit > diverged*first) exit
          if (is_to_end(system)) exit
-         if (self%hasty .and. mod(k, few_steps) == 1) then
-            if (k > 1 .and. self%now%merit > 0.5_dp*marked) exit
-            marked = self%now%merit
-         end if
+         if (is_too_slow(self, k, marked)) exit
          call find_step(self, system, step, found)
          if (.not. found) exit
          call take_step(self, system, step, k)
       end do
       solved = self%now%worst <= goal
    end subroutine iterate
+
+   !> Has the residual not been halved in the number of steps that are allowed for it?
+   function is_too_slow(self, k, marked) result(yes)
+      class(joint_newton_type), intent(in) :: self
+      integer, intent(in) :: k                         !! the step that follows
+      real(dp), intent(inout) :: marked                !! residual when it was last checked
+      logical :: yes
+
+      yes = .false.
+      if (self%steps_to_halve == 0) return
+      if (modulo(k - 1, self%steps_to_halve) /= 0) return
+      yes = k > 1 .and. self%now%merit > 0.5_dp*marked
+      marked = self%now%merit
+   end function is_too_slow
 
    !> Solve with a pressure that rises within the second range of s, and reduce this rise to zero step by step. Each
    !> solve starts from the solution before. If the first solve fails, the rise is made larger.

@@ -252,6 +252,7 @@ contains
       type(joint_state_type), intent(inout) :: state
       integer :: c
 
+      call self%tiles%forget()
       call choose_units(self, touching, pressure, rms_slope)
       self%width(:, :) = merge(self%rules%width, 0.0_dp, self%rules%has_jump(slope_x, slope_y))
       state%s(:, :) = self%rules%number_of(self%width, touching, pressure, gap)

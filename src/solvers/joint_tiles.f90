@@ -6,9 +6,12 @@
 !> is read at the displaced cells, and the friction law. This is what makes the equations hard to solve where slopes are
 !> steep or cells nearly stick. The effect of distant cells is left to GMRES. Larger tiles hardly save directions.
 !>
+!> Near a solution the derivative hardly changes from one of Newton's steps to the next. An inverse is therefore only made
+!> again if its cells or their derivatives have changed.
+!>
 !> If processes share the rows, all of them keep the list of all cells.
 !>
-!> Memory: the inverses in single precision, at most 162 doubles per cell in the list, and 22 doubles per cell while they
+!> Memory: the inverses in single precision, at most 183 doubles per cell in the list, and 22 doubles per cell while they
 !> are made. Where there is no memory for the inverse of a tile, its residuals remain as they are.
 module joint_tiles
    use asperity_parallel, only : any_process, gather_rows, global_sum
@@ -25,6 +28,8 @@ module joint_tiles
    integer, parameter :: side = 4                !! cells along a side of a tile, at most
    integer, parameter :: near_reach = side + 2*tile_rim - 1   !! largest distance of two cells of a tile
    real(sp), parameter :: least_pivot = 1.0e-2_sp
+   !> The inverse of a tile is kept if the parts of its matrix change by no more than this part of the largest entry.
+   real(dp), parameter :: negligible = 0.1_dp
 
    ! Displacements around a loaded cell that are even in x and in y, odd in x and in y, or neither:
    integer, parameter :: even = 1, odd = -1, neither = 0
@@ -40,6 +45,7 @@ module joint_tiles
    !> A tile.
    type, extends(tile_cells_type) :: tile_type
       real(sp), allocatable :: inverse(:, :)     !! rows of its own cells [3 own, 3 n]
+      real(dp), allocatable :: own_parts(:, :, :) !! of the matrix that was inverted, for each cell [3, 3, n]
    end type tile_type
 
    !> All tiles of a grid.
@@ -48,6 +54,7 @@ module joint_tiles
       type(tile_layout_type), private :: layout
       type(tile_type), allocatable, private :: tile(:)
    contains
+      procedure :: forget
       procedure :: renew
       procedure :: apply
    end type joint_tiles_type
@@ -80,6 +87,13 @@ contains
       if (grid%shared) near = reshape(global_sum(reshape(near, [size(near)])), shape(near))
    end function near_values
 
+   !> Forget all inverses, so that the next ones do not depend on earlier solves.
+   subroutine forget(self)
+      class(joint_tiles_type), intent(inout) :: self
+
+      if (allocated(self%tile)) deallocate (self%tile)
+   end subroutine forget
+
    !> Make the inverses for a list of cells. `done` is .false. if there is no memory for the list.
    subroutine renew(self, grid, first, cell, derivative, near, scale, done)
       class(joint_tiles_type), intent(inout) :: self
@@ -101,13 +115,15 @@ contains
       if (.not. done) return
       call number_cells(self, grid, first, cell, derivative, number)
 
-      if (allocated(self%tile)) deallocate (self%tile)
-      allocate (self%tile(product(self%layout%tiles)))
+      if (allocated(self%tile)) then
+         if (size(self%tile) /= product(self%layout%tiles)) deallocate (self%tile)
+      end if
+      if (.not. allocated(self%tile)) allocate (self%tile(product(self%layout%tiles)))
       !$omp parallel do default(none) shared(self, number, near, scale) private(t, changed) schedule(dynamic)
       do t = 1, size(self%tile)
          if (.not. self%layout%is_mine(t)) cycle
          call self%layout%list_cells(number, t, self%tile(t), changed)
-         if (self%tile(t)%own > 0) call invert_tile(self%tile(t), self%derivative, near, scale)
+         if (self%tile(t)%own > 0) call renew_tile(self%tile(t), changed, self%derivative, near, scale)
       end do
    end subroutine renew
 
@@ -147,6 +163,42 @@ contains
       end do
    end subroutine number_cells
 
+   !> Make the inverse of a tile, unless its matrix has hardly changed.
+   subroutine renew_tile(tile, changed, derivative, near, scale)
+      type(tile_type), intent(inout) :: tile
+      logical, intent(in) :: changed             !! the tile has other cells than before
+      type(cell_derivative_type), intent(in) :: derivative(:)
+      type(cell_responses_type), intent(in) :: near
+      real(dp), intent(in) :: scale(2)
+      real(dp) :: own_parts(3, 3, size(tile%numbers))
+      integer :: a
+
+      do a = 1, size(tile%numbers)
+         associate (cell => derivative(tile%numbers(a)))
+            own_parts(:, :, a) = cell%by_own + part_of_pair(cell, cell, near, scale, [0, 0])
+         end associate
+      end do
+      if (.not. changed .and. allocated(tile%inverse)) then
+         if (maxval(abs(own_parts - tile%own_parts)) <= negligible*maxval(abs(tile%own_parts))) return
+      end if
+      tile%own_parts = own_parts
+      if (allocated(tile%inverse)) deallocate (tile%inverse)
+      call invert_tile(tile, derivative, near, scale)
+   end subroutine renew_tile
+
+   !> The derivative of the scaled residuals of a cell to the scaled unknowns of a cell, by the displacements alone.
+   pure function part_of_pair(to, from, near, scale, d) result(part)
+      type(cell_derivative_type), intent(in) :: to, from
+      type(cell_responses_type), intent(in) :: near
+      real(dp), intent(in) :: scale(2)
+      integer, intent(in) :: d(2)                !! places of the first cell minus that of the second one
+      real(dp) :: part(3, 3)
+
+      part(:, 1) = [near%depth(d(1), d(2))*from%pressure/scale(1), 0.0_dp, 0.0_dp]
+      part(:, 2:3) = scale(2)*(matmul(to%by_place, near%place(:, :, d(1), d(2))) &
+         + matmul(to%by_slip, near%slip(:, :, d(1), d(2))))
+   end function part_of_pair
+
    !> Make the inverse of a tile, if there is memory for it.
    subroutine invert_tile(tile, derivative, near, scale)
       type(tile_type), intent(inout) :: tile
@@ -155,18 +207,13 @@ contains
       real(dp), intent(in) :: scale(2)
       real(sp) :: matrix(3*size(tile%numbers), 3*size(tile%numbers))
       real(dp) :: part(3, 3)
-      integer :: a, b, d(2), status
+      integer :: a, b, status
 
       do b = 1, size(tile%numbers)
          do a = 1, size(tile%numbers)
-            d = tile%places(:, a) - tile%places(:, b)
-            associate (to => derivative(tile%numbers(a)), from => derivative(tile%numbers(b)))
-               part = 0.0_dp
-               if (a == b) part = to%by_own
-               part(1, 1) = part(1, 1) + near%depth(d(1), d(2))*from%pressure/scale(1)
-               part(:, 2:3) = part(:, 2:3) + scale(2)*(matmul(to%by_place, near%place(:, :, d(1), d(2))) &
-                  + matmul(to%by_slip, near%slip(:, :, d(1), d(2))))
-            end associate
+            part = part_of_pair(derivative(tile%numbers(a)), derivative(tile%numbers(b)), near, scale, &
+               tile%places(:, a) - tile%places(:, b))
+            if (a == b) part = tile%own_parts(:, :, a)
             matrix(3*a - 2:3*a, 3*b - 2:3*b) = real(part, sp)
          end do
       end do

@@ -43,7 +43,7 @@ module steady_friction
    use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : steady_operator_type
    use steady_start, only : contact_without_friction, ratio_of_sliding
-   use steady_pace, only : along_path, along_second_path, components, from_here, no_attempt, pace_type
+   use steady_pace, only : along_path, along_second_path, components, from_here, new_pace, no_attempt, pace_type
    implicit none
    private
 
@@ -103,6 +103,7 @@ contains
       call prepare_problem(problem, self%grid, operator%threads, contact%height, self%task, determined)
       call begin(self, contact, outcome%normal)
       if (outcome%normal%stopped) return
+      pace = new_pace(self%law)
       pace%accepted = self%task%tolerance
       outcome%normal%reason = reason_iterations
       outcome%tangential%reason = reason_iterations
@@ -126,8 +127,7 @@ contains
 
          if (outcome%tangential%iterations >= doubtful .and. mod(outcome%tangential%iterations, check_every) == 0) &
             call keep_best(self, pace, contact)
-         call pace%choose_attempt(outcome%tangential%iterations, largest, self%task%tolerance, self%grid%cells(), &
-            self%law%jumps_at_edge())
+         call pace%choose_attempt(outcome%tangential%iterations, largest, self%task%tolerance, self%grid%cells())
          if (pace%attempt /= no_attempt) then
             call solve_at_once(self, pace, contact, outcome)
             if (outcome%normal%stopped .or. outcome%converged()) exit
@@ -279,6 +279,7 @@ contains
       self%joint%base = self%base
       self%joint%c = self%c
       self%joint%attempt = pace%attempt
+      self%joint%affordable = pace%expected
       call self%joint%solve(self%law, self%operator, self%task, self%road, contact, outcome)
       if (outcome%normal%stopped .or. outcome%converged()) return
 

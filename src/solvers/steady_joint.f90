@@ -28,12 +28,14 @@ module steady_joint
    public :: steady_joint_type
 
    integer, parameter :: near_evaluations = 300       !! largest number in an attempt from the present contact
+   real(dp), parameter :: transforms_of_evaluation = 8.0_dp
    integer, parameter :: most_evaluations = 4000       !! largest number in any other attempt, ...
    real(dp), parameter :: large = 16384.0_dp           !! ... on grids of this number of cells
    real(dp), parameter :: most_on_small = 5.0_dp       !! factor by which it may be larger on smaller grids
    !> Newton's method first solves to this number of tolerances. Its units differ from those of the errors, which often
    !> meet the tolerance then.
-   real(dp), parameter :: accepted = 30.0_dp
+   real(dp), parameter :: accepted = 300.0_dp
+   integer, parameter :: steps_on_path = 3             !! of Newton's method that must halve the residual
    real(dp), parameter :: rough = 1.0e-2_dp            !! tolerance of the solutions along the path
    real(dp), parameter :: first_step = 0.25_dp         !! along the path
    real(dp), parameter :: growth = 1.5_dp              !! of a step that succeeded
@@ -63,6 +65,7 @@ module steady_joint
       real(dp) :: direction(2) = 0.0_dp
       real(dp) :: c = 0.0_dp
       integer :: attempt = no_attempt                  !! where the solution starts (module steady_pace)
+      real(dp) :: affordable = 0.0_dp                  !! transforms of an attempt from the present contact
       logical, private :: ready = .false.              !! the fields are allocated
       type(steady_system_type), private :: system
       type(joint_newton_type), private :: newton
@@ -97,11 +100,12 @@ contains
          system%c = self%c
          system%target = task%target
          system%evaluations = 0
-         system%most_evaluations = budget(self%attempt, operator%grid%cells())
+         system%most_evaluations = budget(self, operator%grid%cells())
          system%rules%law = law
          call start(system, self%newton%now)
          ! A jump may need many steps, because cells change their state one after the other.
-         self%newton%hasty = .not. law%jumps_at_edge()
+         self%newton%steps_to_halve = merge(0, steps_on_path, law%jumps_at_edge())
+         if (self%attempt == from_here .and. .not. law%jumps_at_edge()) self%newton%steps_to_halve = 1
          if (self%attempt == along_path .or. self%attempt == along_second_path) then
             call follow_path(self, system, accepted*task%tolerance, solved)
          else
@@ -130,16 +134,19 @@ contains
       if (.not. self%ready .and. allocated(self%system%width)) deallocate (self%system%width)
    end subroutine prepare
 
-   !> The largest number of evaluations of an attempt. On small grids they cost little time, and contacts of few cells
-   !> are the hardest to solve.
-   pure function budget(attempt, cells) result(evaluations)
-      integer, intent(in) :: attempt
+   !> The largest number of evaluations of an attempt. One from the present contact may take as many transforms as the
+   !> rounds that it replaces. Others may take more on small grids, where they cost little time, and where contacts of few
+   !> cells are the hardest to solve.
+   pure function budget(self, cells) result(evaluations)
+      class(steady_joint_type), intent(in) :: self
       real(dp), intent(in) :: cells                    !! of the grid
       integer :: evaluations
 
-      evaluations = near_evaluations
-      if (attempt /= from_here) &
+      if (self%attempt == from_here) then
+         evaluations = nint(min(self%affordable/transforms_of_evaluation, real(near_evaluations, dp)))
+      else
          evaluations = nint(most_evaluations*min(max(sqrt(large/cells), 1.0_dp), most_on_small))
+      end if
    end function budget
 
    !> Follow a path of solutions (continuation): only a part of the tangential displacement counts, and this part grows
@@ -160,7 +167,7 @@ contains
       call before%make_room(system%grid, status(2))
       solved = .not. any_process(any(status /= 0))
       if (.not. solved) return
-      self%newton%hasty = .false.
+      self%newton%steps_to_halve = 0
       call count_part(system, self%attempt, 0.0_dp)
       call self%newton%solve(system, rough, solved)
       reached = 0.0_dp
@@ -172,7 +179,7 @@ contains
          part = reached + step
          if (part > 1.0_dp - shortest_step) part = 1.0_dp
          call count_part(system, self%attempt, part)
-         self%newton%hasty = self%attempt == along_path
+         self%newton%steps_to_halve = merge(steps_on_path, 0, self%attempt == along_path)
          if (last_step > 0.0_dp) call extend_line(before, met, step/last_step, self%newton%now)
          call self%newton%solve(system, merge(rough, tolerance, part < 1.0_dp), solved)
          if (solved) then

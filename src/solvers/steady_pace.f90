@@ -12,10 +12,11 @@
 !> transforms. Far from the solution it is tried if a number of rounds has not been sufficient.
 module steady_pace
    use asperity_precision, only : dp
+   use friction_law, only : friction_law_type
    implicit none
    private
 
-   public :: pace_type
+   public :: new_pace, pace_type
 
    integer, parameter, public :: components = 5  !! of a state: z, u, r
 
@@ -29,26 +30,32 @@ module steady_pace
    integer, parameter, public :: along_second_path = 4
    !> Rounds before the first attempt that does not start from the present contact. The next two follow after half as
    !> many rounds each.
-   integer, parameter :: first_far = 150
+   integer, parameter :: first_without_jump = 150
    integer, parameter :: first_with_jump = 100   !! the same if the traction jumps at the edge of the contact
    integer, parameter :: compared = 8            !! rounds whose least change is compared with that of as many before
    integer, parameter :: patience = 25           !! least number of rounds between attempts from the present contact
-   real(dp), parameter :: near_solution = 1.0e-3_dp  !! change below which an attempt from here usually succeeds
    real(dp), parameter :: almost = 5.0_dp        !! change, in tolerances, below which the rounds continue in any case
-   real(dp), parameter :: price = 900.0_dp      !! transforms of such an attempt on a grid of ...
+   !> Change of a round below which an attempt from the present contact usually succeeds. With the slope effect the rounds
+   !> converge more slowly, so that an earlier attempt is worth more.
+   real(dp), parameter :: near_on_flat = 1.0e-3_dp, near_on_slopes = 1.0e-2_dp
+   real(dp), parameter :: price = 900.0_dp       !! transforms of such an attempt on a grid of ...
    real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; they grow like its square root
+   real(dp), parameter :: least_progress = 1.0e-3_dp  !! decades per round; slower rounds count as if they made this
 
    !> The pace of the rounds.
    type :: pace_type
       real(dp) :: beta = 0.5_dp                  !! part of a change of u that is taken
       integer :: inner = 4                       !! normal steps in a round
       logical :: accelerated = .false.
-      real(dp) :: near = 0.03_dp                 !! change below which rounds are accelerated
+      real(dp) :: smooth = 0.03_dp               !! change below which rounds are accelerated
       real(dp) :: least = huge(1.0_dp)           !! least change since the acceleration began
       real(dp) :: marked = huge(1.0_dp)          !! change at the last check of the progress of plain rounds
       integer :: since = 0                       !! plain rounds since that check
       real(dp) :: weights(components) = 0.0_dp   !! of the components in the acceleration
       integer :: attempt = no_attempt            !! to solve all cells at once, after this round
+      real(dp) :: expected = 0.0_dp              !! transforms of the rounds that an attempt from here replaces
+      integer, private :: first_far = first_without_jump   !! round of the first attempt that is not from here
+      real(dp), private :: near = near_on_flat       !! change below which an attempt from here is allowed
       integer, private :: next_attempt = 2*compared     !! first round in which one from here is allowed
       real(dp), private :: recent(2*compared) = huge(1.0_dp)   !! changes of the last rounds
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
@@ -61,6 +68,15 @@ module steady_pace
 
 contains
 
+   !> The pace at the beginning of the rounds with a friction law.
+   pure function new_pace(law) result(self)
+      type(friction_law_type), intent(in) :: law
+      type(pace_type) :: self
+
+      if (law%jumps_at_edge()) self%first_far = first_with_jump
+      if (law%slope_effect) self%near = near_on_slopes
+   end function new_pace
+
    !> Choose whether the next step is accelerated.
    subroutine choose(self, change, begins)
       class(pace_type), intent(inout) :: self
@@ -70,8 +86,8 @@ contains
       begins = .false.
       if (self%accelerated .and. change > 4.0_dp*self%least) then
          self%accelerated = .false.
-         self%near = 0.3_dp*self%least
-      else if (.not. self%accelerated .and. change < self%near) then
+         self%smooth = 0.3_dp*self%least
+      else if (.not. self%accelerated .and. change < self%smooth) then
          self%accelerated = .true.
          self%least = change
          begins = .true.
@@ -80,33 +96,31 @@ contains
    end subroutine choose
 
    !> Decide whether all cells are to be solved at once after a round.
-   subroutine choose_attempt(self, rounds, change, tolerance, cells, jumps)
+   subroutine choose_attempt(self, rounds, change, tolerance, cells)
       class(pace_type), intent(inout) :: self
       integer, intent(in) :: rounds              !! so far
       real(dp), intent(in) :: change             !! of the last round
       real(dp), intent(in) :: tolerance          !! of the change
       real(dp), intent(in) :: cells              !! of the grid
-      logical, intent(in) :: jumps               !! the traction jumps at the edge of the contact
       real(dp) :: decades_left, decades_per_round, least, least_before, transforms
-      integer :: first
 
-      first = merge(first_with_jump, first_far, jumps)
       self%recent = [self%recent(2:), change]
       self%attempt = no_attempt
-      if (rounds == first) self%attempt = from_best
-      if (2*rounds == 3*first) self%attempt = along_path
-      if (rounds == 2*first) self%attempt = along_second_path
+      if (rounds == self%first_far) self%attempt = from_best
+      if (2*rounds == 3*self%first_far) self%attempt = along_path
+      if (rounds == 2*self%first_far) self%attempt = along_second_path
       if (self%attempt /= no_attempt .or. rounds < self%next_attempt) return
 
       ! An accelerated round may have a much larger change than its neighbours. The progress is therefore measured by the
       ! least changes, and an attempt starts only from a round whose change is near the least one.
       least = minval(self%recent(compared + 1:))
       least_before = minval(self%recent(:compared))
-      if (least > near_solution .or. least < almost*tolerance .or. change > 2.0_dp*least) return
+      if (least > self%near .or. least < almost*tolerance .or. change > 2.0_dp*least) return
       decades_per_round = log10(least_before/least)/compared
       decades_left = log10(least/tolerance)
       transforms = 6.0_dp + 2.0_dp*self%inner
-      if (decades_left*transforms <= decades_per_round*price*sqrt(cells/priced_cells)) return
+      self%expected = decades_left*transforms/max(decades_per_round, least_progress)
+      if (self%expected <= price*sqrt(cells/priced_cells)) return
       self%attempt = from_here
       self%next_attempt = rounds + max(patience, rounds/2)
    end subroutine choose_attempt
