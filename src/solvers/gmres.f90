@@ -80,7 +80,7 @@ contains
       self%right = 0.0_dp
       call keep(self, 1, b, 1.0_dp)
       if (self%short_of_memory) return
-      square = self%products(b, 1)
+      square = self%products(b, 1, 1)
       self%length = sqrt(square(1))
       self%left = merge(1.0_dp, 0.0_dp, self%length > 0.0_dp)
       if (.not. self%length > 0.0_dp) return
@@ -127,13 +127,13 @@ contains
       class(gmres_type), intent(inout) :: self
       type(cell_vector_type), intent(inout) :: w    !! out: undefined
       real(dp), allocatable :: column(:), part(:)
-      real(dp) :: length, turned
+      real(dp) :: length, square(1), turned
       integer :: k, n, round
 
       n = self%used + 1
       allocate (column(n + 1), source=0.0_dp)
       do round = 1, 2
-         part = self%products(w, n)
+         part = self%products(w, 1, n)
          column(:n) = column(:n) + part
          do k = 1, n
             w%cells = w%cells - part(k)*self%basis(k)%cells
@@ -142,8 +142,8 @@ contains
       end do
       call keep(self, n + 1, w, 1.0_dp)
       if (self%short_of_memory) return
-      part = self%products(w, n + 1)
-      length = sqrt(max(part(n + 1), 0.0_dp))
+      square = self%products(w, n + 1, n + 1)
+      length = sqrt(max(square(1), 0.0_dp))
       column(n + 1) = length
       if (length > 0.0_dp) call keep(self, n + 1, w, length)
 
@@ -184,25 +184,25 @@ contains
       end do
    end subroutine solution
 
-   !> The products of a vector with the first directions.
-   function products(self, w, n) result(sums)
+   !> The products of a vector with some directions.
+   function products(self, w, first, last) result(sums)
       class(gmres_type), intent(in) :: self
       type(cell_vector_type), intent(in) :: w
-      integer, intent(in) :: n
-      real(dp) :: sums(n)
+      integer, intent(in) :: first, last            !! numbers of the directions
+      real(dp) :: sums(first:last)
       real(dp), allocatable :: rows(:, :)
       integer :: i, j, k
 
-      allocate (rows(n, size(self%first) - 1), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, w, n, rows) private(i, j, k)
+      allocate (rows(first:last, size(self%first) - 1), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, w, first, last, rows) private(i, j, k)
       do j = 1, size(self%first) - 1
-         do k = 1, n
+         do k = first, last
             do i = self%first(j), self%first(j + 1) - 1
                rows(k, j) = rows(k, j) + sum(w%cells(:, i)*self%basis(k)%cells(:, i))
             end do
          end do
       end do
-      sums = row_totals(rows) + w%beside*self%basis(:n)%beside
+      sums = row_totals(rows) + w%beside*self%basis(first:last)%beside
    end function products
 
 end module gmres
