@@ -1,6 +1,5 @@
 !> Tests of the solver that solves a step with friction all at once: GMRES, the states of a cell, and the approximate
-!> inverse. Runs
-!> with such steps are in python/tests/test_hard_steps.py and test_constant_shear.py.
+!> inverse. Runs with such steps are in python/tests/test_hard_steps.py and test_constant_shear.py.
 module test_joint_step
    use adhesion_potential, only : new_adhesion_potential
    use asperity_errors, only : error_type
@@ -32,6 +31,7 @@ contains
       if (selected('gmres_solves_a_system')) call gmres_solves_a_system()
       if (selected('states_join_without_a_jump')) call states_join_without_a_jump()
       if (selected('inverse_of_one_tile_is_exact')) call inverse_of_one_tile_is_exact()
+      if (selected('inverse_is_kept_while_cells_hardly_change')) call inverse_is_kept_while_cells_hardly_change()
    end subroutine run_joint_step
 
    !> A matrix without symmetry with an additional unknown, against its known solution.
@@ -152,6 +152,71 @@ contains
          call check_close((other%load_residual - state%load_residual)/change, v%beside, 1.0e-4_dp, 'load or level')
       end do
    end subroutine inverse_of_one_tile_is_exact
+
+   !> The inverse of a tile is that of an earlier state while its cells hardly change, and that of the present state where
+   !> a cell begins to slip, or after the first state of another solve was made.
+   subroutine inverse_is_kept_while_cells_hardly_change()
+      integer, parameter :: n = 2
+      type(toy_system_type) :: system
+      type(joint_state_type) :: state, other
+      real(dp) :: again(3, n*n), fresh(3, n*n), hardly(3, n*n), start(3, n*n)
+      integer :: status
+
+      call new_toy_system(system, n)
+      system%level_is_given = .true.
+      call state%make_room(system%grid, status)
+      call other%make_room(system%grid, status)
+      state%s = 0.5_dp
+      call improved(state, start)
+      state%s(1, 1) = 0.501_dp
+      state%t(1, 1, 1) = 1.0e-3_dp
+      call improved(state, hardly)
+      call check_close(maxval(abs(hardly - start)), 0.0_dp, 0.0_dp, 'a cell that hardly changes')
+      call forget(hardly)
+      call check_order(maxval(abs(hardly - start)), '>', 0.0_dp, 'the same in another solve')
+
+      state%t(1, 1, 1) = 1.0_dp
+      call improved(state, again)
+      call check_order(maxval(abs(again - hardly)), '>', 0.1_dp, 'a cell that begins to slip')
+      call forget(fresh)
+      call check_close(maxval(abs(again - fresh)), 0.0_dp, 0.0_dp, 'the inverse of the present state')
+
+   contains
+
+      !> Apply the approximate inverse of a state to a residual.
+      subroutine improved(at, cells)
+         type(joint_state_type), intent(inout) :: at
+         real(dp), intent(out) :: cells(:, :)
+         type(cell_vector_type) :: v
+         logical :: done
+
+         call system%evaluate(at)
+         call system%linearise(at, [1, 3, 5], [1, 2, 1, 2], done)
+         call check_that(done, 'memory')
+         v%cells = reshape([1.0_dp, 0.3_dp, 0.2_dp, 0.5_dp, 0.7_dp, 0.1_dp, 0.4_dp, 0.9_dp, 0.6_dp, 0.8_dp, 0.2_dp, &
+            0.3_dp], [3, n*n])
+         call system%improve(v, 0)
+         cells = v%cells
+      end subroutine improved
+
+      !> Begin another solve, whose units are those of this one, and apply the inverse of the same state.
+      subroutine forget(cells)
+         real(dp), intent(out) :: cells(:, :)
+         type(toy_system_type) :: new
+
+         call new_toy_system(new, n)
+         call system%begin(state%s > 0.0_dp, state%s, 0.0_dp*state%s, state%t, 0.0_dp*state%s, 0.0_dp*state%s, 0.1_dp, &
+            other)
+         system%root = new%root
+         system%unit_length = new%unit_length
+         system%unit_traction = new%unit_traction
+         system%unit_pressure = new%unit_pressure
+         system%rules%width = new%rules%width
+         system%width = 0.0_dp
+         call improved(state, cells)
+      end subroutine forget
+
+   end subroutine inverse_is_kept_while_cells_hardly_change
 
    !> A system on n x n cells whose displacements fall off with the distance.
    subroutine new_toy_system(system, n)

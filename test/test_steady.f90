@@ -13,6 +13,7 @@ module test_steady
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
    use solver_result, only : solver_result_type
+   use steady_pace, only : from_here, new_pace, no_attempt, pace_type
    use steady_contact, only : explain, sliding_outcome_type, steady_contact_type
    use steady_step, only : new_steady_step, steady_state_type, steady_step_type
    use asperity_surface, only : new_height
@@ -54,8 +55,45 @@ contains
       if (selected('constant_shear_at_the_edge')) call constant_shear_at_the_edge()
       if (selected('slow_contact_is_finished_by_newton')) call slow_contact_is_finished_by_newton()
       if (selected('stalled_rounds_are_solved_at_once')) call stalled_rounds_are_solved_at_once()
+      if (selected('attempts_begin_where_rounds_are_slow')) call attempts_begin_where_rounds_are_slow()
       if (selected('reasons_are_complete')) call reasons_are_complete()
    end subroutine run_steady
+
+   !> Slow rounds lead to an attempt for all cells, on slopes sooner than on flat roads, on grids of any size. It may take
+   !> the transforms that the rounds would take. Fast rounds lead to none.
+   subroutine attempts_begin_where_rounds_are_slow()
+      real(dp), parameter :: tolerance = 1e-6_dp, cells = 16384.0_dp
+      type(pace_type) :: pace
+
+      call do_rounds(.true., 8e-3_dp, 0.99_dp, cells)
+      call check_that(pace%attempt == from_here, 'slow rounds on slopes')
+      ! A round takes 14 transforms, and a factor of 0.99 takes 1/log10(1/0.99) rounds a decade.
+      call check_close(pace%expected, 14.0_dp*(log10(8e-3_dp*0.99_dp**15/tolerance))/log10(1.0_dp/0.99_dp), 1e-6_dp, &
+         'transforms that they need')
+      call do_rounds(.false., 8e-3_dp, 0.99_dp, cells)
+      call check_that(pace%attempt == no_attempt, 'slow rounds on a flat road, far from the solution')
+      call do_rounds(.false., 8e-4_dp, 0.99_dp, cells)
+      call check_that(pace%attempt == from_here, 'slow rounds on a flat road, near the solution')
+      call do_rounds(.true., 8e-3_dp, 0.7_dp, cells)
+      call check_that(pace%attempt == no_attempt, 'fast rounds')
+      call do_rounds(.true., 8e-3_dp, 1.0_dp, 1e8_dp)
+      call check_that(pace%attempt == from_here, 'rounds without progress on a large grid')
+
+   contains
+
+      !> Report sixteen rounds whose change falls by a factor each.
+      subroutine do_rounds(slope_effect, first, factor, size_of_grid)
+         logical, intent(in) :: slope_effect
+         real(dp), intent(in) :: first, factor, size_of_grid
+         integer :: k
+
+         pace = new_pace(new_friction_law('coulomb', 0.5_dp, 0.0_dp, 0.0_dp, slope_effect, .true.))
+         do k = 1, 16
+            call pace%choose_attempt(k, first*factor**(k - 1), tolerance, size_of_grid)
+         end do
+      end subroutine do_rounds
+
+   end subroutine attempts_begin_where_rounds_are_slow
 
    !> The reasons why there may be no solution fit into the record of an outcome.
    subroutine reasons_are_complete()

@@ -185,24 +185,24 @@ contains
    end subroutine solution
 
    !> The products of a vector with some directions.
-   function products(self, w, first, last) result(sums)
+   function products(self, w, from, to) result(sums)
       class(gmres_type), intent(in) :: self
       type(cell_vector_type), intent(in) :: w
-      integer, intent(in) :: first, last            !! numbers of the directions
-      real(dp) :: sums(first:last)
+      integer, intent(in) :: from, to               !! numbers of the first and the last direction
+      real(dp) :: sums(from:to)
       real(dp), allocatable :: rows(:, :)
       integer :: i, j, k
 
-      allocate (rows(first:last, size(self%first) - 1), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, w, first, last, rows) private(i, j, k)
+      allocate (rows(from:to, size(self%first) - 1), source=0.0_dp)
+      !$omp parallel do default(none) shared(self, w, from, to, rows) private(i, j, k)
       do j = 1, size(self%first) - 1
-         do k = first, last
+         do k = from, to
             do i = self%first(j), self%first(j + 1) - 1
                rows(k, j) = rows(k, j) + sum(w%cells(:, i)*self%basis(k)%cells(:, i))
             end do
          end do
       end do
-      sums = row_totals(rows) + w%beside*self%basis(first:last)%beside
+      sums = row_totals(rows) + w%beside*self%basis(from:to)%beside
    end function products
 
 end module gmres

@@ -28,7 +28,8 @@ module joint_tiles
    integer, parameter :: side = 4                !! cells along a side of a tile, at most
    integer, parameter :: near_reach = side + 2*tile_rim - 1   !! largest distance of two cells of a tile
    real(sp), parameter :: least_pivot = 1.0e-2_sp
-   !> The inverse of a tile is kept if the parts of its matrix change by no more than this part of the largest entry.
+   !> An inverse is kept if the effects of the cells of the tile on themselves change by no more than this, relative to
+   !> the largest of them.
    real(dp), parameter :: negligible = 0.1_dp
 
    ! Displacements around a loaded cell that are even in x and in y, odd in x and in y, or neither:
@@ -45,7 +46,7 @@ module joint_tiles
    !> A tile.
    type, extends(tile_cells_type) :: tile_type
       real(sp), allocatable :: inverse(:, :)     !! rows of its own cells [3 own, 3 n]
-      real(dp), allocatable :: own_parts(:, :, :) !! of the matrix that was inverted, for each cell [3, 3, n]
+      real(dp), allocatable :: own_parts(:, :, :) !! effect of each cell on itself, in that matrix [3, 3, n]
    end type tile_type
 
    !> All tiles of a grid.
@@ -163,7 +164,7 @@ contains
       end do
    end subroutine number_cells
 
-   !> Make the inverse of a tile, unless its matrix has hardly changed.
+   !> Make the inverse of a tile, unless the effects of its cells on themselves have hardly changed.
    subroutine renew_tile(tile, changed, derivative, near, scale)
       type(tile_type), intent(inout) :: tile
       logical, intent(in) :: changed             !! the tile has other cells than before

@@ -27,15 +27,16 @@ module steady_joint
 
    public :: steady_joint_type
 
-   integer, parameter :: near_evaluations = 300       !! largest number in an attempt from the present contact
-   real(dp), parameter :: transforms_of_evaluation = 8.0_dp
+   real(dp), parameter :: transforms = 8.0_dp          !! of an evaluation
+   ! Newton's steps that must halve the residual, in an attempt from the present contact and in any other:
+   integer, parameter :: near_steps = 1, far_steps = 3
+   integer, parameter :: near_evaluations = 300        !! largest number in an attempt from the present contact
    integer, parameter :: most_evaluations = 4000       !! largest number in any other attempt, ...
    real(dp), parameter :: large = 16384.0_dp           !! ... on grids of this number of cells
    real(dp), parameter :: most_on_small = 5.0_dp       !! factor by which it may be larger on smaller grids
    !> Newton's method first solves to this number of tolerances. Its units differ from those of the errors, which often
    !> meet the tolerance then.
    real(dp), parameter :: accepted = 300.0_dp
-   integer, parameter :: steps_on_path = 3             !! of Newton's method that must halve the residual
    real(dp), parameter :: rough = 1.0e-2_dp            !! tolerance of the solutions along the path
    real(dp), parameter :: first_step = 0.25_dp         !! along the path
    real(dp), parameter :: growth = 1.5_dp              !! of a step that succeeded
@@ -104,8 +105,8 @@ contains
          system%rules%law = law
          call start(system, self%newton%now)
          ! A jump may need many steps, because cells change their state one after the other.
-         self%newton%steps_to_halve = merge(0, steps_on_path, law%jumps_at_edge())
-         if (self%attempt == from_here .and. .not. law%jumps_at_edge()) self%newton%steps_to_halve = 1
+         self%newton%steps_to_halve = merge(near_steps, far_steps, self%attempt == from_here)
+         if (law%jumps_at_edge()) self%newton%steps_to_halve = 0
          if (self%attempt == along_path .or. self%attempt == along_second_path) then
             call follow_path(self, system, accepted*task%tolerance, solved)
          else
@@ -143,7 +144,7 @@ contains
       integer :: evaluations
 
       if (self%attempt == from_here) then
-         evaluations = nint(min(self%affordable/transforms_of_evaluation, real(near_evaluations, dp)))
+         evaluations = nint(min(self%affordable/transforms, real(near_evaluations, dp)))
       else
          evaluations = nint(most_evaluations*min(max(sqrt(large/cells), 1.0_dp), most_on_small))
       end if
@@ -179,7 +180,7 @@ contains
          part = reached + step
          if (part > 1.0_dp - shortest_step) part = 1.0_dp
          call count_part(system, self%attempt, part)
-         self%newton%steps_to_halve = merge(steps_on_path, 0, self%attempt == along_path)
+         self%newton%steps_to_halve = merge(far_steps, 0, self%attempt == along_path)
          if (last_step > 0.0_dp) call extend_line(before, met, step/last_step, self%newton%now)
          call self%newton%solve(system, merge(rough, tolerance, part < 1.0_dp), solved)
          if (solved) then

@@ -40,7 +40,7 @@ module steady_pace
    real(dp), parameter :: near_on_flat = 1.0e-3_dp, near_on_slopes = 1.0e-2_dp
    real(dp), parameter :: price = 900.0_dp       !! transforms of such an attempt on a grid of ...
    real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; they grow like its square root
-   real(dp), parameter :: least_progress = 1.0e-3_dp  !! decades per round; slower rounds count as if they made this
+   real(dp), parameter :: least_progress = 1.0e-9_dp  !! decades per round of rounds that make no progress
 
    !> The pace of the rounds.
    type :: pace_type
