@@ -66,7 +66,7 @@ def count(folder: Path, text: str) -> tuple[list[int], list[float], bool]:
     path.write_text(text)
     converged = True
     try:
-        run = asperity.run(path)
+        run = asperity.run(path, overwrite=True)     # an earlier run may have ended unfinished
     except asperity.NotConverged:
         run = asperity.open(path.with_suffix(".h5"))
         converged = False
