@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
+import signal
 import sys
 
 from .base.library import version
@@ -25,7 +27,8 @@ def main(arguments: list[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done; 2 wrong arguments; 3 a file cannot be read or written; 4 a computation failed.
+        0 done; 2 wrong arguments; 3 a file cannot be read or written; 4 a computation failed, or
+        needs more memory than there is; 130 stopped by Ctrl-C.
     """
     parser = argparse.ArgumentParser(
         prog=os.environ.get("ASPERITY_COMMAND", "python -m asperity"),
@@ -36,7 +39,8 @@ def main(arguments: list[str] | None = None) -> int:
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):
         add(verbs)
-    chosen = parser.parse_args(arguments)
+    chosen = parser.parse_args(with_negative_lists(sys.argv[1:] if arguments is None
+                                                   else arguments))
     try:
         return chosen.call(chosen)
     except (OSError, ImportError) as error:
@@ -45,9 +49,34 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(error, 2)
     except RuntimeError as error:
         return _fail(error, 4)
+    except MemoryError as error:
+        return _fail(MemoryError(f"not enough memory: {error}" if str(error) else
+                                 "not enough memory"), 4)
+    except KeyboardInterrupt:
+        return _fail(KeyboardInterrupt("stopped by Ctrl-C"), 128 + signal.SIGINT)
 
 
-def _fail(error: Exception, status: int) -> int:
+def with_negative_lists(arguments: list[str]) -> list[str]:
+    """Return the words of a command line, with lists that begin with a minus as values.
+
+    argparse takes ``-10`` as a value, but ``-10,20`` and ``-1e-3`` as unknown options.
+
+    Examples
+    --------
+    >>> with_negative_lists(["--temperatures", "-10,20", "--angle", "-5"])
+    ['--temperatures=-10,20', '--angle', '-5']
+    """
+    words: list[str] = []
+    for word in arguments:
+        if (words and words[-1].startswith("--") and "=" not in words[-1]
+                and re.match(r"-\.?\d.*[,:eE]", word)):
+            words[-1] += f"={word}"
+        else:
+            words.append(word)
+    return words
+
+
+def _fail(error: BaseException, status: int) -> int:
     """Print a message and return the exit status."""
     if isinstance(error, OSError) and error.strerror and error.filename:
         text = f"{error.filename}: {error.strerror}"

@@ -284,6 +284,8 @@ WRONG = [
     ("f (rpm),G' (Pa),G'' (Pa)\n1,2,3\n2,3,4\n3,4,5\n", ["line 1: column frequency: has the unit"
                                                      " 'rpm': must be one of Hz"]),
     ("f (Hz),G' (psi),G'' (Pa)\n1,2,3\n2,3,4\n3,4,5\n", ["column storage: has the unit 'psi'"]),
+    ("T (F),f (Hz),G' (Pa),G'' (Pa)\n9,1,2,3\n9,2,3,4\n9,3,4,5\n",
+     ["column temperature: has the unit 'F': must be one of C, K"]),
     ("f (Hz),G' (Pa),G'' (Pa)\n1,2,3\n2,3,4\n", ["has 2 rows of numbers: must have at least 3"]),
     ("f (Hz),G' (Pa),G'' (Pa)\n", ["has a header and no numbers"]),
     ("\n# nothing\n", ["is empty"]),

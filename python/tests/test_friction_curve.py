@@ -259,6 +259,45 @@ def test_the_same_after_a_stop(tmp_path, number):
     assert (tmp_path / "curve.csv").read_text() == stopped
 
 
+def test_without_resume_all_runs_are_made_again(tmp_path):
+    plan = small_plan()
+    whole = curve_of(plan, tmp_path)
+    results = sorted(path for path in tmp_path.glob("*.h5") if "-p" in path.name)
+    before = [path.stat().st_mtime_ns for path in results]
+    again = run_curve(plan, tmp_path, Means(1, resume=False), quiet=True)
+    assert all(path.stat().st_mtime_ns > one for path, one in zip(results, before, strict=True))
+    same(whole, again)
+    with pytest.raises(ValueError, match="not with slurm"):
+        run_curve(plan, tmp_path, Means(1, resume=False, slurm=""), quiet=True)
+
+
+def test_more_patches_do_not_repeat_runs_without_resume(tmp_path, capsys):
+    plan = small_plan(speeds=[1e-2])
+    wanted = 0.8 * curve_of(replace(plan, patches=8), tmp_path).largest_error
+    capsys.readouterr()
+    run_curve(plan, tmp_path, Means(2, resume=False), error=wanted)
+    first, *later = re.findall("(\\d+) of (\\d+) results are there already",
+                               "0 of 8 results are there already\n" + capsys.readouterr().err)
+    assert first == ("0", "8") and later[0][0] == "8"
+
+
+def test_ctrl_c_ends_without_a_traceback(tmp_path):
+    (tmp_path / "rubber.nml").write_text(NAMELIST)
+    # A shell starts programs in the background with SIGINT ignored.
+    process = subprocess.Popen(
+        [sys.executable, "-m", "asperity", "friction", ROAD, "--material", "rubber.nml",
+         "--speeds", "1e-3:1:6", "--cells", "48", "--patches", "4", "--jobs", "1"],
+        cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+    said = ""
+    for line in process.stderr:
+        said += line
+        if "1 of 4 done" in line:
+            process.send_signal(signal.SIGINT)
+    assert process.wait(PATIENCE) == 130
+    assert "asperity: stopped by Ctrl-C" in said and "Traceback" not in said
+
+
 SBATCH = """#!/bin/sh
 # A stand-in for Slurm: notes the call, and runs the tasks of an array one after the other.
 echo "$@" >> "{folder}/calls"
@@ -444,6 +483,7 @@ def test_page_in_a_browser(curve, tmp_path):
         browser.drag(place, place)
         assert "speed 100 mm/s" in browser.run(
             "return document.getElementById('point').textContent")
+        assert browser.run("return document.getElementById('choose-speed').value") == "2"
         assert browser.run("return document.querySelector('#map canvas').toDataURL()") != before
         for against in ("pressure", "temperature", "reduced", "speed"):
             browser.run("const choice = document.getElementById('against'); choice.value ="
@@ -566,6 +606,19 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--join", "blend"], "join: is for patches"),
     ([ROAD, "--material", "r.nml", "-o", "curve.txt"], "must end in .html"),
     ([ROAD, "--material", "r.nml", "--jobs", "0"], "jobs = 0"),
+    ([ROAD, "--material", "r.nml", "--pressures", "-1e5"], "pressures[0] = -100000.0"),
+    ([ROAD, "--material", "r.nml", "--speeds", "-1,2"], "speeds[0] = -1.0"),
+    ([ROAD, "--material", "r.nml", "--temperatures", "-99"], "temperature = -99: a_T = inf by"),
+    ([ROAD, "--material", "r.nml", "--seed", "-3"], "seed = -3: must be an integer >= 0"),
+    ([ROAD, "--material", "r.nml", "--wlf", "8", "120"], "wlf: is for DMA tables only"),
+    ([ROAD, "--material", "r.nml", "--column", "storage=2"], "--column): is for DMA tables"),
+    ([ROAD, "--material", "r.nml", "--unit", "um"], "unit: only for roads that are files"),
+    ([ROAD, "--material", "r.nml", "--size", "1", "2"], "size: only for roads that are files"),
+    ([ROAD, "--material", "r.nml", "--outliers", "remove"], "outliers: is for measured maps"),
+    ([ROAD, "--material", "r.nml", "--side", "1e-2", "--short", "1e-4"],
+     "short = 0.00025: must be at least two"),
+    ([ROAD, ROAD, "--material", "r.nml"], "is given twice"),
+    ([ROAD, "--material", "r.nml", "--side", "1e-5"], "that are wanted, at most 1e-05 m"),
 ])
 def test_wrong_arguments(tmp_path, monkeypatch, capsys, words, message):
     monkeypatch.chdir(tmp_path)
@@ -588,6 +641,118 @@ def test_roads_that_are_refused(tmp_path, monkeypatch, capsys, height, message):
     assert message in capsys.readouterr().err
 
 
+def test_lists_may_begin_with_a_minus(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    words = [ROAD, "--material", "r.nml", "--cells", "32", "--plan"]
+    assert main(["friction", *words, "--temperatures", "-10,20"]) == 0
+    assert "2 temperatures" in capsys.readouterr().out
+    assert main(["friction", *words, "--angle", "-1e1"]) == 0
+
+
+def test_too_little_memory_is_no_traceback(tmp_path, monkeypatch, capsys):
+    def without_memory(*_, **__):
+        raise MemoryError("Unable to allocate 74.5 GiB")
+
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    monkeypatch.setattr("asperity.roads.spectra.Spectrum.draw", without_memory)
+    assert main(["friction", ROAD, "--material", "r.nml", "--plan"]) == 4
+    assert capsys.readouterr().err == "asperity: not enough memory: Unable to allocate 74.5 GiB\n"
+
+
+def test_a_file_cannot_be_the_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    assert main(["friction", ROAD, "--material", "r.nml", "--cells", "32", "--speeds", "1",
+                 "--folder", "r.nml"]) == 3
+    assert "r.nml: is a file: the runs need a folder" in capsys.readouterr().err
+
+
+def test_a_profile_makes_a_road(tmp_path, monkeypatch, capsys):
+    """A line scan in x, z columns, which is not periodic; its heading names the units."""
+    pytest.importorskip("SurfaceTopography")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    height = 1e-5 * np.cos(2 * np.pi * np.arange(1000) / 100)
+    height += 1e-7 * np.random.default_rng(1).standard_normal(1000)
+    np.savetxt("profile.txt", np.column_stack([1e-2 * np.arange(1000), 1e6 * height]),
+               header="x (mm),z (um)", comments="", delimiter=",")
+    found = road_of(["profile.txt"], cells=32).whole_spectrum
+    assert found.wavenumber[np.argmax(found.psd)] == pytest.approx(2 * np.pi / 1e-3, rel=0.1)
+    assert main(["friction", "profile.txt", "--material", "r.nml", "--cells", "32", "--plan"]) == 0
+    assert "profile.txt: 8 patches" in capsys.readouterr().out
+    with pytest.raises(ValueError, match="has its own unit, 'um'"):
+        road_of(["profile.txt"], unit="mm")
+
+
+@pytest.mark.parametrize("heads", [
+    "q (rad/um), Phi (um4)", "q [µm^-1]; Phi (µm⁴)", "# q (1/um), C(q) (um^4)", "q 1/um\tC um4"])
+def test_headings_of_a_spectrum_name_units(tmp_path, heads):
+    k = np.geomspace(1e3, 1e5, 9)
+    psd = 1e-17 * (k / 1e4) ** -3.6
+    shown = psd * 1e24 / (4 * np.pi**2 if "C" in heads else 1.0)
+    mark = next(mark for mark in (";", "\t", ",") if mark in heads)
+    (tmp_path / "s.csv").write_text("\n".join(
+        [heads, *(f"{a!r}{mark}{b!r}" for a, b in zip((1e-6 * k).tolist(), shown.tolist(),
+                                                      strict=True))]), encoding="utf-8")
+    found = road_of([f"spectrum:{tmp_path / 's.csv'}"], cells=64).whole_spectrum
+    np.testing.assert_allclose(found.wavenumber, k, rtol=1e-12)
+    np.testing.assert_allclose(found.psd, psd, rtol=1e-12)
+
+
+def test_persson_density_of_a_profile(tmp_path):
+    """C1D = Phi1/(2 pi) in the convention in which C = Phi/(4 pi^2)."""
+    k = np.geomspace(1e3, 1e5, 9)
+    found = []
+    for head, factor in (("Phi1 (m3)", 1.0), ("C1D (m3)", 2.0 * np.pi), ("C(q) m^3", 2.0 * np.pi)):
+        table = np.column_stack([k, 1e-13 * (k / 1e4) ** -2.6 / factor])
+        np.savetxt(tmp_path / "s.csv", table, header=f"q (rad/m), {head}", comments="",
+                   delimiter=",")
+        found.append(road_of([f"spectrum:{tmp_path / 's.csv'}"], cells=64).whole_spectrum.psd)
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("head", "message"), [
+    ("wavelength (m), Phi (m4)", "must be the wave number"),
+    ("q (cycles/m), Phi (m4)", "has the unit 'cycles/m'"),
+    ("q (rad/m), PSD (dB)", "has the unit 'dB'")])
+def test_spectra_that_are_refused(tmp_path, head, message):
+    (tmp_path / "s.csv").write_text(f"{head}\n1e3,1e-16\n1e4,1e-18\n")
+    with pytest.raises(ValueError, match=re.escape(message)):
+        road_of([f"spectrum:{tmp_path / 's.csv'}"])
+
+
+def test_options_count_for_all_roads_and_no_road_counts_twice(tmp_path):
+    height = asperity.surface.self_affine(96, lx=1e-3, wavelength_long=2e-4, wavelength_short=8e-5,
+                                          rms_slope=0.1, seed=3) + np.linspace(0.0, 1e-5, 96)
+    for name in ("a.h5", "b.h5"):
+        asperity.surface.save(tmp_path / name, height, 1e-3, boundary="free")
+    files = [tmp_path / "a.h5", tmp_path / "b.h5"]
+    road = road_of(files, cells=32, level="none", join="mirror")
+    first, second = (one.height for one in road._maps)
+    np.testing.assert_array_equal(first, second)
+    with pytest.raises(ValueError, match=r"a\.h5 is given twice"):
+        road_of([files[0], str(files[0])], cells=32)
+    with pytest.raises(ValueError, match="roads: a ndarray"):
+        road_of([height], cells=32)
+
+
+def test_outliers_are_removed_from_maps_whose_spectrum_is_drawn(tmp_path):
+    height = asperity.surface.self_affine(96, lx=1e-3, wavelength_long=2e-4, wavelength_short=8e-5,
+                                          rms_slope=0.1, seed=3)
+    asperity.surface.save(tmp_path / "good.h5", height, 1e-3)
+    height[20, 30] += 1e-3
+    asperity.surface.save(tmp_path / "dust.h5", height, 1e-3)
+    good = road_of([tmp_path / "good.h5"], draw=True, cells=32)
+    mended = road_of([tmp_path / "dust.h5"], draw=True, cells=32, outliers="remove")
+    k = np.geomspace(2 * np.pi / 1.8e-4, 2 * np.pi / 9e-5, 20)
+    np.testing.assert_allclose(mended.whole_spectrum.at(k), good.whole_spectrum.at(k), rtol=0.05)
+    assert any("replaced by the median" in note for note in mended.notes)
+    reported = road_of([tmp_path / "dust.h5"], draw=True, cells=32)
+    assert any("1 of 9216 cells lie far off" in note for note in reported.notes), reported.notes
+
+
 def test_missing_points_are_noted(tmp_path):
     """They are filled when a map is read, and the plan reports how many."""
     height = asperity.surface.self_affine(64, lx=1e-3, wavelength_long=5e-4, wavelength_short=1e-4,
@@ -600,6 +765,9 @@ def test_missing_points_are_noted(tmp_path):
 @pytest.mark.parametrize(("material", "words", "message"), [
     ("&material prony_g = 1e6, prony_tau = 1 /", [], "shear_modulus = 0"),
     ("&material shear_modulus = 1e6 /", ["--temperatures", "20,60"], "r.nml gives no a_T"),
+    ("&grid nx = 4 /", [], "r.nml: has no moduli"),
+    ("&material shear_modulus = 1e6, prony_g = 1e6, 2e6, prony_tau = 1e-3 /", [],
+     "r.nml: &material: tau"),
 ])
 def test_rubbers_that_are_refused(tmp_path, monkeypatch, capsys, material, words, message):
     monkeypatch.chdir(tmp_path)

@@ -542,3 +542,23 @@ def test_the_command_s_errors(tmp_path, monkeypatch, capsys):
         main(["import", "--level", "flat", "map.npy"])
     assert main(["import", "map.npy", "--list"]) == 0
     assert "23 x 14 points, no unit" in capsys.readouterr().out
+
+
+def test_a_bare_dataset_is_read_as_the_program_reads_it(tmp_path, capsys):
+    """Its shape is (ny, nx), and its heights are in metres; only the lengths have to be given."""
+    height = 1e-6 * sample()
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["surface/height"] = height
+    found = load(tmp_path / "road.h5", level="none", size=(46e-6, 21e-6))
+    np.testing.assert_array_equal(found.height, height)
+    assert (found.lx, found.ly, found.unit) == (46e-6, 21e-6, "m")
+    with pytest.raises(ValueError, match="has its own unit, 'm'"):
+        load(tmp_path / "road.h5", unit="um", size=(46, 21))
+
+
+def test_the_message_on_a_damaged_file_names_it(tmp_path):
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["surface/height"] = np.zeros((200, 200))
+    (tmp_path / "road.h5").write_bytes((tmp_path / "road.h5").read_bytes()[:2000])
+    with pytest.raises(OSError, match=r"road\.h5: cannot be read as HDF5"):
+        load(tmp_path / "road.h5", unit="um")

@@ -230,6 +230,18 @@ def test_profiles_of_a_map_have_its_spectrum():
     assert abs(ratio.mean()) < 0.03
 
 
+def test_line_scans_have_the_spectrum_of_their_road():
+    """The ends of a measured line do not fit. A wrong factor of 2 would be 0.3 decades."""
+    height, spectrum = road(1024, short=1 / 100)
+    k = np.geomspace(1.5 * spectrum.wavenumber[0], 0.7 * spectrum.wavenumber[-1], 50)
+    ratios = []
+    for row in range(0, 1024, 32):
+        found = spectrum_of_map(height[row : row + 1, :1000], 1000 / 1024, 1 / 1024)
+        inside = (k > found.wavenumber[0]) & (k < found.wavenumber[-1])
+        ratios.append(np.mean(np.log10(found.at(k[inside]) / spectrum.at(k[inside]))))
+    assert abs(np.mean(ratios)) < 0.15
+
+
 def test_scans_are_joined_within_their_ranges():
     whole = Spectrum(np.geomspace(1e2, 1e6, 41), np.geomspace(1e2, 1e6, 41) ** -3.6)
     wide, fine = whole.cut(short=2 * np.pi / 1e4), whole.cut(long=2 * np.pi / 3e3).scaled(1.1)

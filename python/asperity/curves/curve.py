@@ -187,8 +187,12 @@ def run_curve(
         positive("error", error)
         first = min(FIRST_PATCHES, most_patches, plan.road.count or FIRST_PATCHES)
         plan = replace(plan, patches=max(plan.patches, first))
+    if means.slurm is not None and not means.resume:
+        raise ValueError("resume = False (--no-resume): not with slurm (--slurm): the same call"
+                         " must find the results of the jobs")
+    renewed: set[str] = set()  # with more patches, the runs of the first ones are not made again
     while True:
-        curve = gather(plan, run_pieces(plan, Path(folder), means, quiet), extend)
+        curve = gather(plan, run_pieces(plan, Path(folder), means, quiet, renewed), extend)
         found = curve.largest_error
         limit = min(most_patches, plan.road.count or most_patches)
         if error is None or found <= error:

@@ -57,8 +57,8 @@ class Piece:
         return run, run.history.rows - (0 if run.finished else 1), run.finished
 
 
-def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False
-               ) -> list[tuple[Piece, Patch]]:
+def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False,
+               renewed: set[str] | None = None) -> list[tuple[Piece, Patch]]:
     """Run the pieces that are not complete yet, and return all pieces with their patches.
 
     Parameters
@@ -71,6 +71,9 @@ def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False
         The way in which jobs are run.
     quiet : bool
         Show no progress.
+    renewed : set of str, optional
+        Without `means.resume`, the names of the runs whose results are reused nevertheless, because
+        an earlier call has just made them. The names of the runs of this call are added.
 
     Returns
     -------
@@ -83,7 +86,10 @@ def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False
     SubmittedError
         If the runs were submitted to Slurm.
     """
+    if folder.exists() and not folder.is_dir():
+        raise OSError(f"{folder}: is a file: the runs need a folder")
     folder.mkdir(parents=True, exist_ok=True)
+    renewed = set() if renewed is None else renewed
     patches = [plan.road.patch(number) for number in range(plan.patches)]
     files = [patch.save(folder).name for patch in patches]
     pieces = [_piece(plan, patches[n], files[n], folder, (n, i, j, 0))
@@ -91,7 +97,9 @@ def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False
               for i in range(plan.pressure.size) for j in range(plan.temperature.size)]
     begun, fresh = list(pieces), pieces
     while fresh:
-        waiting = [piece.job for piece in fresh if not _is_there(piece.job)]
+        waiting = [piece.job for piece in fresh
+                   if not ((means.resume or piece.job.name in renewed) and _is_there(piece.job))]
+        renewed |= {piece.job.name for piece in fresh}
         progress = Progress("friction", len(fresh), len(waiting), quiet)
         run_jobs(waiting, folder, progress, means)
         if waiting and means.slurm is not None:

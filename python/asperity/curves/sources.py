@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.check import positive
-from ..base.tables import cells_of, decimals, is_number, text_lines
+from ..base.tables import is_number, text_lines
 from ..roads.measured import MeasuredSurface, load
-from ..roads.patches import DrawnRoad, MeasuredRoad
+from ..roads.patches import DrawnRoad, MeasuredRoad, cleaned
 from ..roads.spectra import Spectrum, join_spectra, spectrum_of_map
 from ..rubber.compound import Compound
 from ..rubber.dma_fit import fit_dma, wlf_constants
@@ -22,6 +21,7 @@ from ..rubber.material import Prony
 from ..rubber.wlf import WLF
 from ..runs.case import Case
 from ..theory.rough import self_affine_psd
+from .spectrum_files import spectrum_of_file
 
 __all__ = ["compound_of", "road_of"]
 
@@ -73,16 +73,23 @@ def road_of(
     OSError, ValueError
         If a file cannot be read, or does not describe a road.
     """
+    _check_twice(sources)
+    seed = _seed(seed)
     maps: list[MeasuredSurface] = []
     spectra: list[Spectrum] = []
+    measured = False  # whether a spectrum is that of a map
+    if options and not any(map(_is_file_of_map, sources)):
+        raise ValueError(f"{', '.join(options)}: only for roads that are files of maps or profiles")
     for source in sources:
         found = _road_source(source, options)
         if isinstance(found, Spectrum):
             spectra.append(found)
         elif found.height.shape[0] == 1 or draw:
-            spectra.append(spectrum_of_map(found.height, found.lx, found.ly,
-                                           periodic=found.periodic,
-                                           name=str(found.source.get("name", "map"))))
+            clean, notes = cleaned(found, outliers)
+            spectrum = spectrum_of_map(clean.height, clean.lx, clean.ly, periodic=clean.periodic,
+                                       name=str(clean.source.get("name", "map")))
+            spectra.append(replace(spectrum, notes=[*notes, *spectrum.notes]))
+            measured = measured or found.height.shape[0] > 1
         else:
             maps.append(found)
     if maps and spectra:
@@ -94,7 +101,38 @@ def road_of(
         return MeasuredRoad(maps, cells, join, short, outliers, seed)
     if join is not None:
         raise ValueError("join: is for patches of measured maps only")
+    if outliers != "report" and not measured:
+        raise ValueError("outliers: is for measured maps only")
     return DrawnRoad(join_spectra(spectra), cells, side, short, seed)
+
+
+def _check_twice(sources: Sequence[Any]) -> None:
+    """Refuse a source that is given twice: its patches would count twice in the intervals."""
+    seen = set()
+    for source in sources:
+        if not isinstance(source, str | Path):
+            continue
+        words = str(source)
+        kind, colon, file = words.rpartition("spectrum:")
+        known = words if words.startswith("self_affine:") else kind + colon + str(
+            Path(file).resolve())
+        if known in seen:
+            raise ValueError(f"roads: {words} is given twice: its patches would count as"
+                             " independent ones")
+        seen.add(known)
+
+
+def _is_file_of_map(source: Any) -> bool:
+    """Return whether a source is a file that `asperity.surface.load` reads."""
+    return isinstance(source, str | Path) and not str(source).startswith(
+        ("self_affine:", "spectrum:"))
+
+
+def _seed(value: Any) -> int:
+    """Return a seed as an int."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
+        raise ValueError(f"seed = {value!r}: must be an integer >= 0")
+    return int(value)
 
 
 def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[str, Any]
@@ -106,8 +144,12 @@ def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[
     if words.startswith("self_affine:"):
         return _self_affine(words.partition(":")[2])
     if words.startswith("spectrum:"):
-        return _spectrum_file(Path(words.partition(":")[2]))
-    return load(words, level=options.pop("level", "tilt"), **options)
+        return spectrum_of_file(Path(words.partition(":")[2]))
+    if not isinstance(source, str | Path):
+        raise ValueError(f"roads: a {type(source).__name__}: must be the name of a file, words such"
+                         " as 'self_affine:...', a MeasuredSurface or a Spectrum; an array becomes"
+                         " a file with asperity.surface.save")
+    return load(words, **{"level": "tilt", **options})
 
 
 def _self_affine(words: str) -> Spectrum:
@@ -128,33 +170,6 @@ def _self_affine(words: str) -> Spectrum:
     return Spectrum(*self_affine_psd(
         values["hurst"], long, values.get("wavelength_rolloff", long), values["wavelength_short"],
         rms_height=values.get("rms_height"), rms_slope=values.get("rms_slope")), "self-affine road")
-
-
-def _spectrum_file(path: Path) -> Spectrum:
-    """Return the spectrum of a table: wave numbers (rad/m) and densities.
-
-    The second column is Phi (m4). If its heading begins with C, it is Persson's C = Phi/(4 pi^2);
-    if it contains m3, it is the density of a profile.
-    """
-    rows = cells_of(text_lines(path))
-    heads = [] if is_number(rows[0][1][0]) else rows[0][1]
-    body = decimals(rows[1:] if heads else rows)
-    try:
-        values = np.array([[float(cell) for cell in cells[:2]] for _, cells in body])
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}: must have two columns of numbers, wave number (rad/m)"
-                         " and density (m4)") from None
-    if values.ndim != 2 or values.shape[0] < 2 or values.shape[1] < 2:
-        raise ValueError(f"{path}: must have two columns of numbers, at least two rows")
-    head = heads[1] if len(heads) > 1 else ""
-    factor = 4.0 * math.pi**2 if re.match(r"\s*C\b", head) else 1.0
-    order = np.argsort(values[:, 0])
-    wave, psd = values[order, 0], factor * values[order, 1]
-    if re.search(r"m\^?3|m³", head):
-        from ..roads.spectra import isotropic_of_profile
-
-        return isotropic_of_profile(wave, psd, name=path.name)
-    return Spectrum(wave, psd, path.name)
 
 
 def compound_of(
@@ -197,6 +212,11 @@ def compound_of(
     lines = text_lines(path)
     words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")
     if words.startswith(("&", "$")):
+        for name, value in (("wlf", wlf), ("reference", reference), ("vertical", vertical or None),
+                            ("columns (--column)", columns or None)):
+            if value is not None:
+                raise ValueError(f"{name}: is for DMA tables only: {path} is a namelist, which has"
+                                 " its own wlf_c1, wlf_c2 and reference_temperature")
         return _of_namelist(path)
     fit = fit_dma(read_dma(path, columns=columns), wlf=wlf, reference=reference, vertical=vertical,
                   arms_per_decade=arms_per_decade)
@@ -208,11 +228,17 @@ def _of_namelist(path: Path) -> Compound:
     """Return the rubber of the group `&material` of an input."""
     group = Case.read(path).material
     spring = float(group.shear_modulus or 0.0)
-    if group.zener_g0:
-        series = Prony.from_zener(spring, group.zener_g0, group.zener_g1 or (),
-                                  group.zener_eta or ())
-    else:
-        series = Prony(spring, group.prony_g or (), group.prony_tau or ())
+    if not (spring or group.zener_g0 or group.prony_g):
+        raise ValueError(f"{path}: has no moduli: must have a group &material with shear_modulus"
+                         " and Prony arms or Zener branches")
+    try:
+        if group.zener_g0:
+            series = Prony.from_zener(spring, group.zener_g0, group.zener_g1 or (),
+                                      group.zener_eta or ())
+        else:
+            series = Prony(spring, group.prony_g or (), group.prony_tau or ())
+    except ValueError as error:
+        raise ValueError(f"{path}: &material: {error}") from None
     reference = float(group.reference_temperature)
     wlf = None
     if group.wlf_c1 and group.wlf_c2:

@@ -86,6 +86,9 @@ def _open(path: Path) -> Any:
         raise OSError(f"{path}: was read as the format {reader.format()!r} and holds no heights:"
                       " an instrument's own file is needed, or a table of numbers; the grey values"
                       " of a picture have no unit")
+    if reader.format() == "xyz" and (named := _with_units(path)) is not None:
+        reader.close()
+        return named
     if _is_doubtful(reader, path):
         try:
             found = text_map(path)
@@ -97,6 +100,18 @@ def _open(path: Path) -> Any:
             reader.close()
         return found
     return reader
+
+
+def _with_units(path: Path) -> Any:
+    """Return the map of a list of points whose heading names units, otherwise None.
+
+    SurfaceTopography does not read such headings, and takes the heights in the unit of x.
+    """
+    try:
+        found = text_map(path)
+    except (OSError, ValueError):
+        return None
+    return found if found.default_channel.unit is not None else None
 
 
 def _is_doubtful(reader: Any, path: Path) -> bool:

@@ -117,7 +117,7 @@ class PlainReader:
 
 
 def own_map(path: Path) -> PlainReader | None:
-    """Return the road of a result or of a file that `MeasuredSurface.save` has written.
+    """Return the road of a result or of a file with the dataset ``surface/height``.
 
     For any other file, None is returned. In contrast to SurfaceTopography's HDF5 files, the
     datasets of this package have the shape (ny, nx).
@@ -126,12 +126,18 @@ def own_map(path: Path) -> PlainReader | None:
 
     if path.stat().st_size < 8 or not h5py.is_hdf5(path):
         return None
-    with h5py.File(path, "r", locking=False) as file:
+    try:
+        file = h5py.File(path, "r", locking=False)
+    except OSError as error:
+        raise OSError(f"{path}: cannot be read as HDF5: {error}") from None
+    with file:
         height, grid = file.get("surface/height"), file.get("grid")
-        if not isinstance(height, h5py.Dataset) or height.ndim != 2 or grid is None or not {
-                "lx", "ly"} <= set(grid.attrs):
+        if not isinstance(height, h5py.Dataset) or height.ndim != 2:
             return None
         array = np.asarray(height[()], dtype=float).T
+        if grid is None or not {"lx", "ly"} <= set(grid.attrs):
+            # A bare dataset, as `&surface file` takes it: heights in metres, lengths unknown.
+            return PlainReader("asperity", PlainMap(array, "surface/height", None, "m"))
         lx, ly = (float(np.ravel(grid.attrs[name])[0]) for name in ("lx", "ly"))
         boundary = np.ravel(grid.attrs.get("boundary", "free"))[0]
         boundary = boundary.decode() if isinstance(boundary, bytes) else str(boundary)

@@ -144,6 +144,46 @@ def rested(height: FloatArray, weight: float = 0.98) -> FloatArray:
     return (tilted - tilted.mean()).reshape(ny, nx)
 
 
+def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[str]]:
+    """Return a map, without its outliers if they shall be removed, and notes on what was found.
+
+    Parameters
+    ----------
+    one : MeasuredSurface
+        A map or a profile. Outliers of profiles are neither found nor removed.
+    outliers : str
+        'report' or 'remove'.
+
+    Returns
+    -------
+    (MeasuredSurface, list of str)
+
+    Raises
+    ------
+    ValueError
+        If `outliers` is neither.
+    """
+    choice("outliers", outliers, ("report", "remove"))
+    name = one.source.get("name", "map")
+    notes = [f"{name}: {step_in_words(step)}" for step in one.steps if step["step"] == "fill"]
+    found = find_outliers(one.height) if one.height.shape[0] > 1 else None
+    if found is None or not found.count:
+        return one, notes
+    if outliers == "report":
+        return one, [*notes, f"{name}: {found.summary()}; `outliers = 'remove'` (--outliers"
+                             " remove) puts the median of the neighbours there"]
+    notes.append(f"{name}: {found.summary()}: replaced by the median of the neighbours")
+    return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
+                           one.source, one.notes), notes
+
+
+def _check_cells(short: float, cell: float) -> None:
+    """Refuse waves that the cells cannot represent."""
+    if short < (2.0 - 1e-9) * cell:
+        raise ValueError(f"short = {short:.4g}: must be at least two cells, {2.0 * cell:.4g} m:"
+                         " shorter waves need smaller cells")
+
+
 class DrawnRoad:
     """A road whose patches are random maps drawn from a spectrum.
 
@@ -173,6 +213,7 @@ class DrawnRoad:
         self.side = 2.0 * spectrum.band[0] if side is None else positive("side", side)
         least = _CELLS_IN_DRAWN_WAVE * self.side / cells
         self.short = max(least if short is None else positive("short", short), spectrum.band[1])
+        _check_cells(self.short, self.side / cells)
         self.spectrum = spectrum.cut(self.side, self.short)
         self.seed = seed
         self.notes = list(spectrum.notes)
@@ -239,10 +280,16 @@ class MeasuredRoad:
                  short: float | None = None, outliers: str = "report", seed: int = 1) -> None:
         if not maps:
             raise ValueError("maps: must have at least one")
-        choice("outliers", outliers, ("report", "remove"))
         cells = whole("cells", cells)
         self.notes: list[str] = []
-        self._maps = [self._clean(one, outliers) for one in maps]
+        self._maps: list[MeasuredSurface] = []
+        for one in maps:
+            if one.height.shape[0] == 1:
+                raise ValueError(f"{one.source.get('name', 'map')}: is a profile: no patches can be"
+                                 " cut from it; it serves as the spectrum of an isotropic road")
+            clean, notes = cleaned(one, outliers)
+            self._maps.append(clean)
+            self.notes += notes
         fewest = min(min(one.height.shape) for one in maps)
         whole_maps = all(one.periodic and max(one.height.shape) <= cells for one in maps)
         self.join = choice("join", method or ("none" if whole_maps else "seam"), JOINS)
@@ -252,6 +299,7 @@ class MeasuredRoad:
         steps = [max(one.lx / one.height.shape[1], one.ly / one.height.shape[0]) for one in maps]
         least = _CELLS_IN_MEASURED_WAVE * max(steps)
         self.short = least if short is None else positive("short", short)
+        _check_cells(self.short, max(steps))
         self.whole_spectrum = join_spectra([
             spectrum_of_map(one.height, one.lx, one.ly, periodic=one.periodic,
                             name=one.source.get("name", "map")) for one in self._maps])
@@ -290,25 +338,6 @@ class MeasuredRoad:
         height = low_pass(height, lx, ly, self.short)
         label = f"{one.source.get('name', 'map')}, rows from {row}, columns from {column}"
         return Patch(height - height.mean(), lx, ly, label)
-
-    def _clean(self, one: MeasuredSurface, outliers: str) -> MeasuredSurface:
-        """Note the outliers of a map; return the map, without them if they shall be removed."""
-        name = one.source.get("name", "map")
-        if one.height.shape[0] == 1:
-            raise ValueError(f"{name}: is a profile: no patches can be cut from it; it serves as"
-                             " the spectrum of an isotropic road")
-        self.notes += [f"{name}: {step_in_words(step)}" for step in one.steps
-                       if step["step"] == "fill"]
-        found = find_outliers(one.height)
-        if not found.count:
-            return one
-        if outliers == "report":
-            self.notes.append(f"{name}: {found.summary()}; `outliers = 'remove'` (--outliers"
-                              " remove) puts the median of the neighbours there")
-            return one
-        self.notes.append(f"{name}: {found.summary()}: replaced by the median of the neighbours")
-        return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
-                               one.source, one.notes)
 
     def _cells(self, fewest: int, cells: int) -> int:
         """Return the number of cells along a side for which the maps have room; it is even."""

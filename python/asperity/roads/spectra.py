@@ -107,8 +107,10 @@ class Spectrum:
         high = self.wavenumber[-1] if short is None else min(
             self.wavenumber[-1], 2.0 * math.pi / positive("short", short))
         if not low < high:
+            wanted = [] if long is None else [f"at most {long:.3g} m"]
+            wanted += [] if short is None else [f"at least {short:.3g} m"]
             raise ValueError(f"{self.name}: has waves of {self.band[0]:.3g} to {self.band[1]:.3g}"
-                             " m, and none of those that are wanted")
+                             f" m, and none of those that are wanted, {' and '.join(wanted)}")
         inner = (self.wavenumber > low * (1 + 1e-12)) & (self.wavenumber < high * (1 - 1e-12))
         k = np.concatenate([[low], self.wavenumber[inner], [high]])
         return Spectrum(k, self.at(k), self.name, list(self.notes))
@@ -209,7 +211,7 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     weights = np.ones_like(height)
     if not periodic:
         height = height - height.mean() if ny == 1 else _levelled(height)
-        weights = _hann(nx) * (1.0 if ny == 1 else _hann(ny)[:, None])
+        weights = _hann(nx) * (np.ones((1, 1)) if ny == 1 else _hann(ny)[:, None])
     modes = np.fft.rfft2((height - np.average(height, weights=weights)) * weights)
     power = np.abs(modes)**2 / (nx * ny * float(np.sum(weights**2)))
     kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)

@@ -87,7 +87,13 @@ class Compound:
             return 1.0
         number("temperature", temperature)
         if self.wlf is not None:
-            return float(self.wlf.shift_factor(temperature))
+            with np.errstate(over="ignore"):
+                found = float(self.wlf.shift_factor(temperature))
+            if not 1e-200 < found < 1e200:
+                raise ValueError(f"temperature = {temperature:g}: a_T = {found:.3g} by the WLF law:"
+                                 " must be between 1e-200 and 1e200; the law diverges at"
+                                 f" {self.wlf.t_ref - self.wlf.c2:g} C")
+            return found
         return 10.0 ** self._interpolated(temperature, self.shifts, "a_T")
 
     def b_t(self, temperature: float) -> float:

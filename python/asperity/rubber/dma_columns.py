@@ -136,8 +136,9 @@ def _name_and_unit(text: str) -> tuple[str, str | None]:
         unit = _unit(found.group(1))
         if unit is None and found.group(1).strip():
             # The parentheses may contain a symbol instead of a unit: "storage modulus (G')".
-            inner = _plain(found.group(1))
-            unit = None if any(inner in names for names in _NAMES.values()) else found.group(1)
+            # "T (F)" is no symbol: F would be a frequency.
+            inner, outer = _role_of_name(found.group(1)), _role_of_name(text[: found.start()])
+            unit = None if inner and outer in (None, inner) else found.group(1)
         text = text[: found.start()].strip()
         symbol = re.search(r"[\[(]([^\[\]()]*)[\])]$", text)
         if symbol and any(_plain(symbol.group(1)) in names for names in _NAMES.values()):
@@ -156,6 +157,11 @@ def _name_and_unit(text: str) -> tuple[str, str | None]:
 def _plain(text: str) -> str:
     """Return a name without blanks, underscores and capitals."""
     return re.sub(r"[\s_.\-*]", "", text).lower()
+
+
+def _role_of_name(text: str) -> str | None:
+    """Return the role that a name without a unit stands for, or None."""
+    return next((role for role, names in _NAMES.items() if _plain(text) in names), None)
 
 
 def role_of(head: str) -> str | None:

@@ -73,7 +73,9 @@ function choices(changed) {
   const entries = axes.map((name) => [name, LABELS[name][0].toLowerCase()]);
   if (data.axes.temperature.length > 1) entries.push(["reduced", "a_T v (master curve)"]);
   if (!axes.includes(against) && axes.length) against = axes[0];
-  choice("Draw against", "against", entries, (value) => { against = value; }).value = against;
+  if (entries.length) {
+    choice("Draw against", "against", entries, (value) => { against = value; }).value = against;
+  }
   for (const name of AXES) {
     if (data.axes[name].length < 2) continue;
     const values = data.axes[name].map((value, i) => [String(i), shown(value, LABELS[name][1])]);
@@ -140,6 +142,10 @@ function choose(x, number) {
   const nearest = points.reduce((best, at) =>
     Math.abs(xOf(at) - x) < Math.abs(xOf(best) - x) ? at : best);
   chosen = {...nearest};
+  for (const name of AXES) {
+    const select = document.getElementById(`choose-${name}`);
+    if (select && !all[name]) select.value = String(chosen[name]);
+  }
   show();
 }
 

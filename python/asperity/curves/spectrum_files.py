@@ -1,0 +1,109 @@
+"""Tables of a spectrum: wave numbers and densities, in the units of their headings."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..base.tables import Rows, cells_of, decimals, is_number, text_lines
+from ..roads.spectra import Spectrum, isotropic_of_profile
+
+__all__ = ["spectrum_of_file"]
+
+_METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
+_LENGTH = "(?P<length>[cmun]?m)"
+_WAVE_UNIT = re.compile(rf"(?:rad|1)/{_LENGTH}|(?:rad[ .*]?)?{_LENGTH.replace('length', 'other')}"
+                        r"\^?\(?-1\)?")
+_PSD_UNIT = re.compile(rf"{_LENGTH}(?:\^|\*\*)?(?P<power>[34])")
+_BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+
+
+def spectrum_of_file(path: Path) -> Spectrum:
+    """Return the spectrum of a table: wave numbers (rad/m) and densities.
+
+    The second column is Phi (m4). If its heading begins with C, it is Persson's C = Phi/(4 pi^2);
+    if it contains m3, it is the density of a profile, Phi1, or C = Phi1/(2 pi). Headings may name
+    other units of length. They may be in a comment.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    OSError, ValueError
+        If the file cannot be read, or is not such a table.
+    """
+    rows = cells_of(text_lines(path))
+    heads = [] if is_number(rows[0][1][0]) else rows[0][1]
+    values = _numbers(path, rows[1:] if heads else rows)
+    heads = heads or _heads_of_comment(path, len(rows[0][1]))
+    first, second = heads[:2] if len(heads) > 1 else ("", "")
+    if re.search("wavelength|lambda|λ|freq", first, re.IGNORECASE):
+        raise ValueError(f"{path}: column 1 is {first!r}: must be the wave number, in rad/m")
+    found = _unit(path, 1, first, _WAVE_UNIT, "rad/m, 1/m, rad/mm, 1/mm, rad/um or 1/um")
+    values[:, 0] /= 1.0 if found is None else _METRES[found["length"] or found["other"]]
+    found = _unit(path, 2, second, _PSD_UNIT, "m4, mm4 or um4, or m3, mm3 or um3 of a profile")
+    power = 4 if found is None else int(found["power"])
+    values[:, 1] *= 1.0 if found is None else _METRES[found["length"]] ** power
+    if re.match(r"\s*C(\b|_|1D|2D|iso)", second):
+        values[:, 1] *= (2.0 * math.pi) ** (power - 2)
+    wave, psd = values[np.argsort(values[:, 0])].T
+    try:
+        if power == 3:
+            return isotropic_of_profile(wave, psd, name=path.name)
+        return Spectrum(wave, psd, path.name)
+    except ValueError as error:
+        raise ValueError(f"{path}: sorted by wave number, {error}") from None
+
+
+def _numbers(path: Path, rows: Rows) -> np.ndarray:
+    """Return the first two columns of a table."""
+    try:
+        values = np.array([[float(cell) for cell in cells[:2]] for _, cells in decimals(rows)])
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}: must have two columns of numbers, wave number (rad/m)"
+                         " and density (m4)") from None
+    if values.ndim != 2 or values.shape[0] < 2 or values.shape[1] < 2:
+        raise ValueError(f"{path}: must have two columns of numbers, at least two rows")
+    return values
+
+
+def _heads_of_comment(path: Path, columns: int) -> list[str]:
+    """Return the headings in the last comment above the numbers; none if they do not fit."""
+    above: list[str] = []
+    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
+        if line.strip() and not line.lstrip().startswith("#"):
+            break
+        if line.strip(" \t#"):
+            above = [line.strip(" \t#")]
+    for separator in (";", "\t", ",", r"\s{2,}", r"\s+(?![\[(])"):
+        for line in above:
+            cells = [cell.strip() for cell in re.split(separator, line)]
+            if len(cells) == columns:
+                return cells
+    return []
+
+
+def _unit(path: Path, column: int, head: str, known: re.Pattern[str], allowed: str
+          ) -> re.Match[str] | None:
+    """Return the unit of a heading; None if it names none."""
+    words = re.sub("[µμ]", "u", head).replace("⁻¹", "^-1").replace("⁴", "4").replace("³", "3")
+    words = words.replace("−", "-")
+    bracket = _BRACKETS.search(words)
+    inside = bracket[1].replace(" ", "") if bracket else ""
+    if not inside or (re.fullmatch("[a-z]{1,3}", inside) and inside not in _METRES):
+        return re.search(rf"(?<![\w/])(?:{known.pattern})(?!\w)", words)  # as in "C(q) um4"
+    found = known.fullmatch(inside)
+    if found is None:
+        raise ValueError(f"{path}: column {column}: has the unit {bracket[1]!r}: must be one of"
+                         f" {allowed}")
+    return found
