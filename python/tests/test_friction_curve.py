@@ -669,7 +669,8 @@ def test_a_file_cannot_be_the_folder(tmp_path, monkeypatch, capsys):
     assert "r.nml: is a file: the runs need a folder" in capsys.readouterr().err
 
 
-def test_a_profile_makes_a_road(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("heads", ["x (mm),z (um)", "# x (mm) z (um)"])
+def test_a_profile_makes_a_road(tmp_path, monkeypatch, capsys, heads):
     """A line scan in x, z columns, which is not periodic; its heading names the units."""
     pytest.importorskip("SurfaceTopography")
     monkeypatch.chdir(tmp_path)
@@ -677,7 +678,7 @@ def test_a_profile_makes_a_road(tmp_path, monkeypatch, capsys):
     height = 1e-5 * np.cos(2 * np.pi * np.arange(1000) / 100)
     height += 1e-7 * np.random.default_rng(1).standard_normal(1000)
     np.savetxt("profile.txt", np.column_stack([1e-2 * np.arange(1000), 1e6 * height]),
-               header="x (mm),z (um)", comments="", delimiter=",")
+               header=heads, comments="", delimiter="," if "," in heads else " ")
     found = road_of(["profile.txt"], cells=32).whole_spectrum
     assert found.wavenumber[np.argmax(found.psd)] == pytest.approx(2 * np.pi / 1e-3, rel=0.1)
     assert main(["friction", "profile.txt", "--material", "r.nml", "--cells", "32", "--plan"]) == 0

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["cells_of", "decimals", "is_number", "text_lines"]
+__all__ = ["cells_of", "decimals", "heads_of_comment", "is_number", "text_lines"]
 
 Rows = list[tuple[int, list[str]]]
 
@@ -72,6 +72,35 @@ def _separator(lines: Sequence[str]) -> str | None:
         if separator in last:
             return separator
     return "," if len(lines) == 1 and "," in lines[0] else None
+
+
+def heads_of_comment(path: Path, columns: int) -> list[str]:
+    """Return the headings in the last comment above the numbers; none if they do not fit.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    columns : int
+        Number of columns of the table.
+
+    Returns
+    -------
+    list of str
+        One heading per column, or an empty list.
+    """
+    above: list[str] = []
+    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
+        if line.strip() and not line.lstrip().startswith("#"):
+            break
+        if line.strip(" \t#"):
+            above = [line.strip(" \t#")]
+    for separator in (";", "\t", ",", r"\s{2,}", r"\s+(?![\[(])"):
+        for line in above:
+            cells = [cell.strip() for cell in re.split(separator, line)]
+            if len(cells) == columns:
+                return cells
+    return []
 
 
 def is_number(cell: str) -> bool:

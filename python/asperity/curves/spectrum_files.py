@@ -8,7 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.tables import Rows, cells_of, decimals, is_number, text_lines
+from ..base.tables import (
+    Rows,
+    cells_of,
+    decimals,
+    heads_of_comment,
+    is_number,
+    text_lines,
+)
 from ..roads.spectra import Spectrum, isotropic_of_profile
 
 __all__ = ["spectrum_of_file"]
@@ -45,7 +52,7 @@ def spectrum_of_file(path: Path) -> Spectrum:
     rows = cells_of(text_lines(path))
     heads = [] if is_number(rows[0][1][0]) else rows[0][1]
     values = _numbers(path, rows[1:] if heads else rows)
-    heads = heads or _heads_of_comment(path, len(rows[0][1]))
+    heads = heads or heads_of_comment(path, len(rows[0][1]))
     first, second = heads[:2] if len(heads) > 1 else ("", "")
     if re.search("wavelength|lambda|λ|freq", first, re.IGNORECASE):
         raise ValueError(f"{path}: column 1 is {first!r}: must be the wave number, in rad/m")
@@ -75,22 +82,6 @@ def _numbers(path: Path, rows: Rows) -> np.ndarray:
     if values.ndim != 2 or values.shape[0] < 2 or values.shape[1] < 2:
         raise ValueError(f"{path}: must have two columns of numbers, at least two rows")
     return values
-
-
-def _heads_of_comment(path: Path, columns: int) -> list[str]:
-    """Return the headings in the last comment above the numbers; none if they do not fit."""
-    above: list[str] = []
-    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
-        if line.strip() and not line.lstrip().startswith("#"):
-            break
-        if line.strip(" \t#"):
-            above = [line.strip(" \t#")]
-    for separator in (";", "\t", ",", r"\s{2,}", r"\s+(?![\[(])"):
-        for line in above:
-            cells = [cell.strip() for cell in re.split(separator, line)]
-            if len(cells) == columns:
-                return cells
-    return []
 
 
 def _unit(path: Path, column: int, head: str, known: re.Pattern[str], allowed: str

@@ -16,7 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.tables import Rows, cells_of, decimals, is_number, text_lines
+from ..base.tables import (
+    Rows,
+    cells_of,
+    decimals,
+    heads_of_comment,
+    is_number,
+    text_lines,
+)
 
 __all__ = ["PlainReader", "own_map", "text_map"]
 
@@ -172,7 +179,7 @@ def text_map(path: Path) -> PlainReader:
         return PlainReader("text", PlainMap(table.T.copy(), "Default"))
     if columns == 1:
         return PlainReader("text", PlainMap(table[:, 0], "Default"))
-    units = _units(rows[first - 1][1] if first else [])
+    units = _units(rows[first - 1][1] if first else heads_of_comment(path, columns))
     unit = None
     if len(units) == columns:
         table[:, :-1] *= [_METRES[one] / _METRES[units[-1]] for one in units[:-1]]
