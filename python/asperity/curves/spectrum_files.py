@@ -91,8 +91,9 @@ def _unit(path: Path, column: int, head: str, known: re.Pattern[str], allowed: s
     words = words.replace("−", "-")
     bracket = _BRACKETS.search(words)
     inside = bracket[1].replace(" ", "") if bracket else ""
-    if not inside or (re.fullmatch("[a-z]{1,3}", inside) and inside not in _METRES):
-        return re.search(rf"(?<![\w/])(?:{known.pattern})(?!\w)", words)  # as in "C(q) um4"
+    is_symbol = re.fullmatch("[a-z]{1,3}", inside) and inside not in _METRES  # as in "C(q) um4"
+    if bracket is None or not inside or is_symbol:
+        return re.search(rf"(?<![\w/])(?:{known.pattern})(?!\w)", words)
     found = known.fullmatch(inside)
     if found is None:
         raise ValueError(f"{path}: column {column}: has the unit {bracket[1]!r}: must be one of"
