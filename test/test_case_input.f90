@@ -241,7 +241,7 @@ contains
       case%phases(3)%steady = .true.
       call check_close(joint_memory(case), 111.0_dp*8*64*32, 1.0e-9_dp, 'memory: a steady row solved all at once')
       case%friction%law = 'coulomb'
-      call check_close(joint_memory(case), 428.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
+      call check_close(joint_memory(case), 443.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
       case%friction%law = 'none'
       case%phases(3)%steady = .false.
       case%phases(3)%velocity_y = 0.0_dp

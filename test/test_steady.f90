@@ -13,7 +13,7 @@ module test_steady
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case, write_map
    use solver_result, only : solver_result_type
-   use steady_pace, only : from_here, new_pace, no_attempt, pace_type
+   use steady_pace, only : along_path, from_best, from_here, new_pace, no_attempt, pace_type
    use steady_contact, only : explain, sliding_outcome_type, steady_contact_type
    use steady_step, only : new_steady_step, steady_state_type, steady_step_type
    use asperity_surface, only : new_height
@@ -55,6 +55,7 @@ contains
       if (selected('constant_shear_at_the_edge')) call constant_shear_at_the_edge()
       if (selected('slow_contact_is_finished_by_newton')) call slow_contact_is_finished_by_newton()
       if (selected('stalled_rounds_are_solved_at_once')) call stalled_rounds_are_solved_at_once()
+      if (selected('path_that_turns_back')) call path_that_turns_back()
       if (selected('attempts_begin_where_rounds_are_slow')) call attempts_begin_where_rounds_are_slow()
       if (selected('reasons_are_complete')) call reasons_are_complete()
    end subroutine run_steady
@@ -78,17 +79,26 @@ contains
       call check_that(pace%attempt == no_attempt, 'fast rounds')
       call do_rounds(.true., 8e-3_dp, 1.0_dp, 1e8_dp)
       call check_that(pace%attempt == from_here, 'rounds without progress on a large grid')
+      call do_rounds(.true., 0.5_dp, 1.0_dp, cells, 64)
+      call check_that(pace%attempt == from_best, 'rounds that stall far from the solution')
+      call do_rounds(.true., 0.5_dp, 0.95_dp, cells, 64)
+      call check_that(pace%attempt == no_attempt, 'slow rounds far from the solution')
+      call do_rounds(.true., 0.5_dp, 1.0_dp, cells, 96)
+      call check_that(pace%attempt == along_path, 'rounds that stall: a path')
 
    contains
 
-      !> Report sixteen rounds whose change falls by a factor each.
-      subroutine do_rounds(slope_effect, first, factor, size_of_grid)
+      !> Report some rounds (16 unless told otherwise) whose change falls by a factor each.
+      subroutine do_rounds(slope_effect, first, factor, size_of_grid, number)
          logical, intent(in) :: slope_effect
          real(dp), intent(in) :: first, factor, size_of_grid
-         integer :: k
+         integer, intent(in), optional :: number
+         integer :: k, rounds
 
          pace = new_pace(new_friction_law('coulomb', 0.5_dp, 0.0_dp, 0.0_dp, slope_effect, .true.))
-         do k = 1, 16
+         rounds = 16
+         if (present(number)) rounds = number
+         do k = 1, rounds
             call pace%choose_attempt(k, first*factor**(k - 1), tolerance, size_of_grid)
          end do
       end subroutine do_rounds
@@ -493,8 +503,25 @@ contains
       call check_that(normal%converged .and. tangential%converged, 'nearly sticking: '//trim(normal%reason))
       call slide_uphill('law = ''coulomb'', coefficient = 1.5', 2, 310, normal, tangential)
       call check_that(normal%converged .and. tangential%converged, 'along a path: '//trim(normal%reason))
-      call check_order(tangential%iterations, '>=', 225, 'along a path: rounds')
+      call check_order(tangential%iterations, '>=', 96, 'along a path: rounds')
    end subroutine stalled_rounds_are_solved_at_once
+
+   !> On these steep roads the path of solutions turns back before all of the tangential displacement counts. A path whose
+   !> parameter only grows ends there.
+   subroutine path_that_turns_back()
+      character(*), parameter :: road = '&grid nx = 12, ny = 12, lx = 12e-3 /'//nl//'&surface shape = '// &
+         '''self_affine'', hurst = 0.8, wavelength_long = 6e-3, wavelength_short = 4e-3, rms_slope = 0.3, seed = '
+      type(record_type) :: record
+      integer, parameter :: seeds(2) = [2, 6]
+      integer :: k
+
+      do k = 1, size(seeds)
+         call run_case(road//to_text(seeds(k))//' /'//nl//'&material shear_modulus = 1e6 /'//nl// &
+            '&friction law = ''coulomb'', coefficient = 1 /'//nl// &
+            '&phase steady = T, pressure = 7e5, velocity_x = 1 /'//nl, 'path that turns back', record)
+         call check_order(int(record%rows(0)%ffts), '<', 4000, 'the path turns back: '//to_text(record%rows(0)%ffts))
+      end do
+   end subroutine path_that_turns_back
 
    !> Run a number of rounds with a friction law on a steep road.
    subroutine slide_uphill(law, seed, rounds, normal, tangential)

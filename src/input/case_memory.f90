@@ -25,8 +25,8 @@ module case_memory
    !> The same of a steady row without friction.
    real(dp), parameter :: newton_fields = 11.0_dp, newton_directions = 50.0_dp
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
-   !> Further fields of a steady row: the last two states on a path of solutions.
-   real(dp), parameter :: path_fields = 13.0_dp
+   !> Further fields of a steady row: three states on a path of solutions, and the plane across it (module `joint_plane`).
+   real(dp), parameter :: path_fields = 28.0_dp
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 

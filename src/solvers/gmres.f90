@@ -12,7 +12,7 @@
 !>    end do
 !>    call krylov%solution(x)
 !>
-!> A vector has some numbers for each cell of a list, and one additional number (`beside`). The list is ordered by the
+!> A vector has some numbers for each cell of a list, and two additional numbers (`beside`). The list is ordered by the
 !> rows of the grid, and sums are formed by row and added up in order, so that they do not depend on the number of
 !> threads or processes. The directions are stored in single precision, which limits the accuracy of x to 1e-6.
 !> Memory is allocated for each direction when it is needed; if there is none left, the method ends.
@@ -28,13 +28,13 @@ module gmres
    !> A vector.
    type :: cell_vector_type
       real(dp), allocatable :: cells(:, :)          !! [numbers, cells of this process]
-      real(dp) :: beside = 0.0_dp                   !! the additional number
+      real(dp) :: beside(2) = 0.0_dp                !! the additional numbers
    end type cell_vector_type
 
    !> A direction, of unit length.
    type :: direction_type
       real(sp), allocatable :: cells(:, :)          !! [numbers, cells of this process]
-      real(dp) :: beside = 0.0_dp
+      real(dp) :: beside(2) = 0.0_dp
    end type direction_type
 
    !> A system that is being solved.
@@ -202,7 +202,10 @@ contains
             end do
          end do
       end do
-      sums = row_totals(rows) + w%beside*self%basis(from:to)%beside
+      sums = row_totals(rows)
+      do k = from, to
+         sums(k) = sums(k) + dot_product(w%beside, self%basis(k)%beside)
+      end do
    end function products
 
 end module gmres

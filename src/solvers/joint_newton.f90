@@ -1,36 +1,26 @@
 !> Newton's method for all unknowns of a contact with friction: the pressures, gaps, tractions and the level
 !> (module `joint_system`).
 !>
-!> Newton's steps are computed by GMRES, whose products with the derivative of the equations are finite differences. An
-!> approximate inverse (module `joint_system`) is applied before each product, so that GMRES measures the true residual.
-!> The steps are shortened if they do not reduce the residual. The gaps of open cells are not unknowns, but follow from the
-!> other unknowns (with adhesion only those of cells that are hardly attracted). If the method fails and a traction may
-!> jump, the equations are regularised: the pressure rises slightly with s in partly sheared cells, which removes the
-!> jump. This rise is then reduced to zero (`reduce_rise`).
+!> Module `joint_linear` computes Newton's steps. They are shortened if they do not reduce the residual. If the method
+!> fails and a traction may jump, the equations are regularised: the pressure rises slightly with s in partly sheared
+!> cells, which removes the jump. This rise is then reduced to zero (`reduce_rise`).
 !>
 !> Memory: 25 fields of doubles, the directions of GMRES with 3 numbers in single precision per unknown cell
-!> and direction, and the approximate inverse. If there is not enough memory, nothing is solved.
+!> and direction, and the approximate inverse; on a path 9 fields more. If there is not enough memory, nothing is solved.
 module joint_newton
-   use adhesion_potential, only : adhesive_curvature
-   use asperity_parallel, only : any_process, rows_before
+   use asperity_parallel, only : any_process
    use asperity_precision, only : dp
-   use field_sums, only : field_count, largest_of_rows
-   use gmres, only : cell_vector_type, gmres_type
+   use field_sums, only : field_count
+   use gmres, only : cell_vector_type
+   use joint_linear, only : is_to_end, joint_linear_type
    use joint_system, only : joint_state_type, joint_system_type
    use regular_grid, only : grid_type
-   use stop_watch, only : stop_is_due
    implicit none
    private
 
    public :: joint_newton_type
 
    integer, parameter :: most_steps = 25
-   integer, parameter :: most_directions = 120         !! directions of GMRES for a step
-   real(dp), parameter :: accuracy = 1.0e-3_dp         !! of a solve by GMRES
-   real(dp), parameter :: far = 0.1_dp                 !! residual from which `far_accuracy` is sufficient
-   real(dp), parameter :: difference = 1.0e-7_dp       !! largest change of an unknown in a product, scaled
-   !> If |e''| over the stiffness of a cell is larger, the gap of an open cell is an unknown.
-   real(dp), parameter :: attracted = 1.0e-4_dp
    real(dp), parameter :: diverged = 100.0_dp          !! a residual this much larger than the first ends the attempt
    real(dp), parameter :: idle = 1.0e-4_dp             !! part by which a step must reduce the residual
    !> Residual that may remain, over the tolerance, and its least value.
@@ -46,19 +36,18 @@ module joint_newton
    !> The method and its work space. A variable of this type must not be copied.
    type :: joint_newton_type
       logical :: ready = .false.
-      real(dp) :: far_accuracy = accuracy              !! of a solve by GMRES far from the solution
       !> Number of steps in which the residual must be halved; otherwise the solve ends without trying a rise. 0: the
       !> residual may fall slowly.
       integer :: steps_to_halve = 0
+      integer :: steps = 0                             !! of the last solve
+      type(joint_linear_type) :: linear                !! the linear system of a step
       type(joint_state_type) :: now                    !! in: the start; out: the solution
-      integer, allocatable, private :: first(:)        !! [rows + 1] of the list of unknown cells
-      integer, allocatable, private :: cell(:)         !! its cells, i
-      type(joint_state_type), private :: trial, best   !! after a part of a step, and the best of these
+      type(joint_state_type), private :: best          !! of the states after parts of a step
       type(joint_state_type), private :: begun         !! from which the present solve began
-      real(dp), allocatable, private :: follow(:, :)   !! change of s of the cells that are not unknown, m [nx, rows]
    contains
       procedure :: prepare
       procedure :: solve
+      procedure :: find_ahead
       procedure :: destroy
    end type joint_newton_type
 
@@ -68,17 +57,13 @@ contains
    subroutine prepare(self, grid)
       class(joint_newton_type), intent(inout) :: self
       type(grid_type), intent(in) :: grid
-      integer :: status(7), n
+      integer :: status(3)
 
       call self%now%make_room(grid, status(1))
-      call self%trial%make_room(grid, status(2))
-      call self%best%make_room(grid, status(3))
-      call self%begun%make_room(grid, status(4))
-      n = grid%rows()
-      allocate (self%follow(grid%nx, n), source=0.0_dp, stat=status(5))
-      allocate (self%first(n + 1), source=1, stat=status(6))
-      allocate (self%cell(grid%nx*n), source=0, stat=status(7))
-      self%ready = .not. any_process(any(status /= 0))
+      call self%best%make_room(grid, status(2))
+      call self%begun%make_room(grid, status(3))
+      call self%linear%make_fields(grid, self%ready)
+      self%ready = self%ready .and. .not. any_process(any(status /= 0))
       if (.not. self%ready) call self%destroy()
    end subroutine prepare
 
@@ -97,14 +82,6 @@ contains
          call reduce_rise(self, system, goal, solved)
    end subroutine solve
 
-   !> Must the attempt end, because of a stop or because it takes too long?
-   function is_to_end(system) result(yes)
-      class(joint_system_type), intent(in) :: system
-      logical :: yes
-
-      yes = stop_is_due() .or. system%evaluations >= system%most_evaluations
-   end function is_to_end
-
    !> Do Newton's steps from the present state.
    subroutine iterate(self, system, goal, solved)
       class(joint_newton_type), intent(inout) :: self
@@ -116,16 +93,18 @@ contains
       integer :: k
       logical :: found
 
-      call system%evaluate(self%now)
+      call self%linear%evaluate(system, self%now)
       first = self%now%merit
       marked = first
+      self%steps = 0
       do k = 1, most_steps
          if (.not. self%now%worst > goal .or. self%now%merit > diverged*first) exit
          if (is_to_end(system)) exit
          if (is_too_slow(self, k, marked)) exit
-         call find_step(self, system, step, found)
+         call self%linear%newton_step(system, self%now, step, found)
          if (.not. found) exit
          call take_step(self, system, step, k)
+         self%steps = k
       end do
       solved = self%now%worst <= goal
    end subroutine iterate
@@ -204,115 +183,27 @@ contains
       system%rules%rise = rise
    end subroutine set_rise
 
-   !> Compute Newton's step, scaled. None is found if there is not enough memory.
-   subroutine find_step(self, system, step, found)
+   !> Find a state on the tangent of a path through a solution, ahead of it in the direction of the plane.
+   subroutine find_ahead(self, system, met, ahead, found)
       class(joint_newton_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system
-      type(cell_vector_type), intent(inout) :: step
+      type(joint_state_type), intent(in) :: met
+      type(joint_state_type), intent(inout) :: ahead
       logical, intent(out) :: found
-      type(gmres_type) :: krylov
-      type(cell_vector_type) :: v
-      integer :: before, cells, status(2)
+      type(cell_vector_type) :: tangent
 
-      call list_cells(self, system)
-      cells = self%first(size(self%first)) - 1
-      before = 0
-      if (system%grid%shared) before = rows_before(cells)
-      if (allocated(step%cells)) deallocate (step%cells)
-      allocate (step%cells(3, cells), stat=status(1))
-      allocate (v%cells(3, cells), stat=status(2))
-      found = .not. any_process(any(status /= 0))
-      if (.not. found) return
-      call self%trial%copy(self%now)
-      call system%evaluate(self%trial)
-      call system%linearise(self%now, self%first, self%cell, found)
-      if (.not. found) return
-
-      call gather(self, self%now%residual, v)
-      v%cells = -v%cells
-      v%beside = -self%now%load_residual
-      call krylov%begin(v, self%first, most_directions, merge(self%far_accuracy, accuracy, self%now%worst > far))
-      do while (krylov%unsolved())
-         if (is_to_end(system)) exit
-         call krylov%next(v)
-         call system%improve(v, before)
-         call change(self, system, v)
-         call gather(self, self%trial%residual, v)
-         v%beside = self%trial%load_residual
-         call krylov%take(v)
-      end do
-      call krylov%solution(step)
-      call system%improve(step, before)
-   end subroutine find_step
-
-   !> List the unknown cells.
-   subroutine list_cells(self, system)
-      class(joint_newton_type), intent(inout) :: self
-      class(joint_system_type), intent(in) :: system
-      logical :: unknown(size(self%now%s, 1))
-      integer :: i, j
-
-      self%first(1) = 1
-      do j = 1, size(self%now%s, 2)
-         unknown = self%now%s(:, j) >= 0.0_dp .or. abs(adhesive_curvature(system%rules%potential, &
-            max(-self%now%s(:, j), 0.0_dp)))*system%rules%soft > attracted
-         self%first(j + 1) = self%first(j) + count(unknown)
-         self%cell(self%first(j):self%first(j + 1) - 1) = pack([(i, i=1, size(unknown))], unknown)
-      end do
-   end subroutine list_cells
-
-   !> Compute the derivative of the equations along a vector of the unknowns, in `trial%residual` of all cells.
-   subroutine change(self, system, v)
-      class(joint_newton_type), intent(inout) :: self
-      class(joint_system_type), intent(inout) :: system
-      type(cell_vector_type), intent(in) :: v
-      real(dp) :: length
-      integer :: j
-
-      length = difference/max(largest_of_rows([maxval(abs(v%cells))]), abs(v%beside)/system%root, tiny(1.0_dp))
-      call add(self, system, v, length)
-      call system%evaluate(self%trial)
-      !$omp parallel do default(none) shared(self, length) private(j)
-      do j = 1, size(self%now%s, 2)
-         self%trial%residual(:, :, j) = (self%trial%residual(:, :, j) - self%now%residual(:, :, j))/length
-      end do
-      self%trial%load_residual = (self%trial%load_residual - self%now%load_residual)/length
-   end subroutine change
-
-   !> Add a multiple of a vector to the present state, and store the result in `trial`.
-   subroutine add(self, system, v, length)
-      class(joint_newton_type), intent(inout) :: self
-      class(joint_system_type), intent(in) :: system
-      type(cell_vector_type), intent(in) :: v
-      real(dp), intent(in) :: length
-      integer :: i, j, k
-
-      self%trial%level = self%now%level + length*v%beside*system%unit_length/system%root
-      !$omp parallel do default(none) shared(self, system, v, length) private(i, j, k)
-      do j = 1, size(self%now%s, 2)
-         self%trial%s(:, j) = self%now%s(:, j)
-         self%trial%t(:, :, j) = self%now%t(:, :, j)
-         do k = self%first(j), self%first(j + 1) - 1
-            i = self%cell(k)
-            self%trial%s(i, j) = self%trial%s(i, j) + length*v%cells(1, k)*system%unit_length
-            self%trial%t(i, :, j) = self%trial%t(i, :, j) + length*v%cells(2:3, k)*system%unit_traction
-         end do
-      end do
-   end subroutine add
-
-   !> Gather the values of a field in the unknown cells.
-   subroutine gather(self, field, v)
-      class(joint_newton_type), intent(in) :: self
-      real(dp), intent(in) :: field(:, :, :)           !! [nx, 3, rows]
-      type(cell_vector_type), intent(inout) :: v
-      integer :: j, k
-
-      do j = 1, size(field, 3)
-         do k = self%first(j), self%first(j + 1) - 1
-            v%cells(:, k) = field(self%cell(k), :, j)
-         end do
-      end do
-   end subroutine gather
+      associate (linear => self%linear)
+         call self%now%copy(met)
+         call linear%evaluate(system, self%now)
+         call linear%tangent(system, self%now, tangent, found)
+         if (.not. found) return
+         call linear%change(system, self%now, tangent)
+         call linear%find_follow(system, self%now, removed=0.0_dp)
+         call linear%add(system, self%now, tangent, 1.0_dp)
+         call ahead%copy(linear%trial)
+         ahead%s(:, :) = ahead%s + linear%follow
+      end associate
+   end subroutine find_ahead
 
    !> Take the step, or a part of it that reduces the residual.
    subroutine take_step(self, system, step, round)
@@ -320,19 +211,16 @@ contains
       class(joint_system_type), intent(inout) :: system
       type(cell_vector_type), intent(in) :: step
       integer, intent(in) :: round
-      integer :: chosen, j, k
+      integer :: chosen, k
 
-      call change(self, system, step)
-      do j = 1, size(self%follow, 2)
-         self%follow(:, j) = -(self%now%residual(:, 1, j) + self%trial%residual(:, 1, j))*system%unit_length
-         self%follow(self%cell(self%first(j):self%first(j + 1) - 1), j) = 0.0_dp
-      end do
+      call self%linear%change(system, self%now, step)
+      call self%linear%find_follow(system, self%now, removed=1.0_dp)
       self%best%merit = huge(1.0_dp)
       do k = 1, size(lengths)
          call try_length(self, system, step, lengths(k))
-         if (self%trial%merit < self%best%merit) call self%best%copy(self%trial)
-         if (self%trial%merit < (1.0_dp - 0.2_dp*lengths(k))*self%now%merit) then
-            call self%now%copy(self%trial)
+         if (self%linear%trial%merit < self%best%merit) call self%best%copy(self%linear%trial)
+         if (self%linear%trial%merit < (1.0_dp - 0.2_dp*lengths(k))*self%now%merit) then
+            call self%now%copy(self%linear%trial)
             return
          end if
       end do
@@ -340,7 +228,7 @@ contains
          ! No length reduces the residual. Take a short step nevertheless, to leave this point.
          chosen = 1 + modulo(7*round, 4)
          call try_length(self, system, step, lengths(chosen))
-         call self%best%copy(self%trial)
+         call self%best%copy(self%linear%trial)
       end if
       call self%now%copy(self%best)
    end subroutine take_step
@@ -353,14 +241,14 @@ contains
       real(dp), intent(in) :: length
       integer :: c, j
 
-      call add(self, system, step, length)
-      do j = 1, size(self%follow, 2)
-         self%trial%s(:, j) = self%trial%s(:, j) + length*self%follow(:, j)
+      call self%linear%add(system, self%now, step, length)
+      do j = 1, size(self%linear%follow, 2)
+         self%linear%trial%s(:, j) = self%linear%trial%s(:, j) + length*self%linear%follow(:, j)
          do c = 1, 2
-            where (self%trial%s(:, j) < 0.0_dp) self%trial%t(:, c, j) = 0.0_dp
+            where (self%linear%trial%s(:, j) < 0.0_dp) self%linear%trial%t(:, c, j) = 0.0_dp
          end do
       end do
-      call system%evaluate(self%trial)
+      call self%linear%evaluate(system, self%linear%trial)
    end subroutine try_length
 
    !> Free the fields.
@@ -369,12 +257,9 @@ contains
       type(joint_state_type) :: none
 
       self%now = none
-      self%trial = none
+      call self%linear%destroy()
       self%best = none
       self%begun = none
-      if (allocated(self%follow)) deallocate (self%follow)
-      if (allocated(self%first)) deallocate (self%first)
-      if (allocated(self%cell)) deallocate (self%cell)
       self%ready = .false.
    end subroutine destroy
 

@@ -35,8 +35,10 @@ module joint_system
       real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
       real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
       real(dp) :: level = 0.0_dp                       !! m
+      real(dp) :: part = 1.0_dp                        !! of the tangential displacement that counts (on a path)
       real(dp), allocatable :: residual(:, :, :)       !! of the equations of a cell, scaled [nx, 3, rows]
       real(dp) :: load_residual = 0.0_dp               !! of the load, scaled, times `root`
+      real(dp) :: path_residual = 0.0_dp               !! of the plane across a path, scaled, times `root`
       real(dp) :: merit = 0.0_dp                       !! root of the sum of the squares of all residuals
       real(dp) :: worst = 0.0_dp                       !! largest absolute residual
    contains
@@ -119,7 +121,9 @@ contains
       self%t(:, :, :) = other%t
       self%residual(:, :, :) = other%residual
       self%level = other%level
+      self%part = other%part
       self%load_residual = other%load_residual
+      self%path_residual = other%path_residual
       self%merit = other%merit
       self%worst = other%worst
    end subroutine copy
@@ -228,13 +232,13 @@ contains
       end if
       call self%tiles%apply(all_cells)
 
-      level = v%beside/self%root
+      level = v%beside(1)/self%root
       if (.not. self%level_is_given) then
          level = 0.0_dp
-         if (abs(self%lift_pressure) > 0.0_dp) level = (v%beside*self%unit_pressure/self%root &
+         if (abs(self%lift_pressure) > 0.0_dp) level = (v%beside(1)*self%unit_pressure/self%root &
             - self%mean_pressure(all_cells))/self%lift_pressure
       end if
-      v%beside = level*self%root
+      v%beside(1) = level*self%root
       do n = 1, size(v%cells, 2)
          v%cells(:, n) = all_cells(:, before + n) + level*self%lift(:, before + n)
       end do

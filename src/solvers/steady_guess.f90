@@ -121,7 +121,7 @@ contains
       guess%work(:, :) = merge(guess%level - guess%gap, 0.0_dp, guess%inside)
       call invert(guess, operator, task%target - field_mean(guess%pressure), level)
       call gather(guess, guess%work, v)
-      v%beside = unit*level
+      v%beside(1) = unit*level
       call krylov%begin(v, guess%first, guess%most_directions, wanted)
       do while (krylov%unsolved())
          call krylov%next(v)
@@ -129,10 +129,10 @@ contains
          mean = field_mean(guess%work)
          call operator%displace(guess%work, guess%moved)
          if (guess%spring > 0.0_dp) guess%moved(:, :) = guess%moved + guess%spring*guess%work
-         guess%work(:, :) = merge(guess%moved - v%beside/unit, 0.0_dp, guess%inside)
+         guess%work(:, :) = merge(guess%moved - v%beside(1)/unit, 0.0_dp, guess%inside)
          call invert(guess, operator, mean, level)
          call gather(guess, guess%work, v)
-         v%beside = unit*level
+         v%beside(1) = unit*level
          call krylov%take(v)
       end do
 
@@ -140,7 +140,7 @@ contains
       call krylov%solution(v)
       call scatter(guess, v, guess%work)
       guess%pressure(:, :) = guess%pressure + guess%work
-      guess%level = guess%level + v%beside/unit
+      guess%level = guess%level + v%beside(1)/unit
       call choose_inverse(guess, real(operator%ffts - before, dp), krylov%left)
    end subroutine correct
 

@@ -5,8 +5,10 @@
 !> without pressure, a cell may carry a share of the strength. The traction then has no jump at the edge of the
 !> contact. With the jump there is often no solution.
 !>
-!> Newton's method starts from a contact that is near the solution, or follows a path of solutions (`follow_path`).
-!> An evaluation takes eight transforms.
+!> Newton's method starts from a contact that is near the solution, or follows a path of solutions (module `joint_path`),
+!> on which a part of the tangential displacement counts: in the slip and where the road is read, or, on the second path,
+!> only where the road is read. One of the paths may end where the other one does not. An evaluation takes eight
+!> transforms.
 module steady_joint
    use asperity_interpolation, only : displaced, interpolation_type
    use asperity_parallel, only : any_process
@@ -14,6 +16,7 @@ module steady_joint
    use field_sums, only : field_count, field_mean, field_sum, ratio_of_lengths
    use friction_law, only : friction_law_type
    use joint_newton, only : joint_newton_type
+   use joint_path, only : follow_path
    use joint_system, only : joint_state_type, joint_system_type
    use joint_tiles, only : cell_responses_type, near_values, neither
    use normal_state, only : normal_problem_type, reason_converged
@@ -33,14 +36,11 @@ module steady_joint
    integer, parameter :: near_evaluations = 300        !! largest number in an attempt from the present contact
    integer, parameter :: most_evaluations = 4000       !! largest number in any other attempt, ...
    real(dp), parameter :: large = 16384.0_dp           !! ... on grids of this number of cells
-   real(dp), parameter :: most_on_small = 5.0_dp       !! factor by which it may be larger on smaller grids
+   real(dp), parameter :: most_on_small = 2.0_dp       !! factor by which it may be larger on smaller grids
    !> Newton's method first solves to this number of tolerances. Its units differ from those of the errors, which often
    !> meet the tolerance then.
    real(dp), parameter :: accepted = 300.0_dp
-   real(dp), parameter :: rough = 1.0e-2_dp            !! tolerance of the solutions along the path
-   real(dp), parameter :: first_step = 0.25_dp         !! along the path
-   real(dp), parameter :: growth = 1.5_dp              !! of a step that succeeded
-   real(dp), parameter :: shortest_step = 1.0e-3_dp
+   real(dp), parameter :: rough = 1.0e-2_dp            !! accuracy of GMRES far from a solution
 
    !> The equations of a state.
    type, extends(joint_system_type) :: steady_system_type
@@ -51,9 +51,9 @@ module steady_joint
       real(dp) :: direction(2) = 0.0_dp                !! e
       real(dp) :: c = 0.0_dp                           !! c_t, Pa
       real(dp) :: target = 0.0_dp                      !! mean pressure, Pa
-      real(dp) :: displaced = 1.0_dp                   !! part of u with which the road is read
-      real(dp) :: stretched = 1.0_dp                   !! part of du/ds in the slip
-      type(cell_responses_type) :: whole               !! displacements around a loaded cell, if all of u counts
+      real(dp) :: part = 1.0_dp                        !! of the tangential displacement that counts
+      logical :: slip_follows = .true.                 !! the slip counts only this part of the displacement, too
+      type(cell_responses_type) :: whole               !! displacements around a loaded cell, if all of it counts
    contains
       procedure :: evaluate
       procedure :: slopes_at
@@ -107,8 +107,9 @@ contains
          ! A jump may need many steps, because cells change their state one after the other.
          self%newton%steps_to_halve = merge(near_steps, far_steps, self%attempt == from_here)
          if (law%jumps_at_edge()) self%newton%steps_to_halve = 0
+         system%slip_follows = self%attempt /= along_second_path
          if (self%attempt == along_path .or. self%attempt == along_second_path) then
-            call follow_path(self, system, accepted*task%tolerance, solved)
+            call follow_path(self%newton, system, accepted*task%tolerance, solved)
          else
             call self%newton%solve(system, accepted*task%tolerance, solved)
          end if
@@ -129,7 +130,7 @@ contains
 
       if (.not. self%newton%ready) call self%newton%prepare(grid)
       if (.not. self%newton%ready) return
-      self%newton%far_accuracy = rough
+      self%newton%linear%far_accuracy = rough
       allocate (self%system%width(grid%nx, grid%rows()), stat=status)
       self%ready = .not. any_process(status /= 0)
       if (.not. self%ready .and. allocated(self%system%width)) deallocate (self%system%width)
@@ -150,84 +151,15 @@ contains
       end if
    end function budget
 
-   !> Follow a path of solutions (continuation): only a part of the tangential displacement counts, and this part grows
-   !> from 0 to 1. At part 0 all cells slide along the motion of the road under the pressure of the contact without
-   !> friction, which is known. On the second path the slip counts fully from the beginning, and only the part of the
-   !> displacement with which the road is read grows: one path may turn back where the other one does not. Each solution
-   !> is predicted by the straight line through the last two. A step is halved if Newton's method does not succeed.
-   subroutine follow_path(self, system, tolerance, solved)
-      class(steady_joint_type), intent(inout) :: self
-      class(steady_system_type), intent(inout) :: system
-      real(dp), intent(in) :: tolerance
-      logical, intent(out) :: solved
-      type(joint_state_type) :: met, before            !! the last two solutions
-      real(dp) :: last_step, part, reached, step
-      integer :: status(2)
-
-      call met%make_room(system%grid, status(1))
-      call before%make_room(system%grid, status(2))
-      solved = .not. any_process(any(status /= 0))
-      if (.not. solved) return
-      self%newton%steps_to_halve = 0
-      call count_part(system, self%attempt, 0.0_dp)
-      call self%newton%solve(system, rough, solved)
-      reached = 0.0_dp
-      last_step = 0.0_dp
-      step = first_step
-      call met%copy(self%newton%now)
-      do while (solved)
-         step = min(step, 1.0_dp - reached)
-         part = reached + step
-         if (part > 1.0_dp - shortest_step) part = 1.0_dp
-         call count_part(system, self%attempt, part)
-         self%newton%steps_to_halve = merge(far_steps, 0, self%attempt == along_path)
-         if (last_step > 0.0_dp) call extend_line(before, met, step/last_step, self%newton%now)
-         call self%newton%solve(system, merge(rough, tolerance, part < 1.0_dp), solved)
-         if (solved) then
-            if (.not. part < 1.0_dp) exit
-            call before%copy(met)
-            call met%copy(self%newton%now)
-            reached = part
-            last_step = step
-            step = growth*step
-         else
-            call self%newton%now%copy(met)
-            step = 0.5_dp*step
-            solved = step > shortest_step .and. system%evaluations < system%most_evaluations
-         end if
-      end do
-      call count_part(system, self%attempt, 1.0_dp)
-   end subroutine follow_path
-
    !> Set the part of the tangential displacement that counts.
-   pure subroutine count_part(system, attempt, part)
+   pure subroutine count_part(system, part)
       class(steady_system_type), intent(inout) :: system
-      integer, intent(in) :: attempt
       real(dp), intent(in) :: part
 
-      system%displaced = part
-      if (attempt == along_path) system%stretched = part
-      system%near = system%whole
-      system%near%place = system%displaced*system%whole%place
-      system%near%slip = system%stretched*system%whole%slip
+      system%part = part
+      system%near%place = part*system%whole%place
+      if (system%slip_follows) system%near%slip = part*system%whole%slip
    end subroutine count_part
-
-   !> Predict a state on the straight line through two others.
-   subroutine extend_line(from, through, part, next)
-      type(joint_state_type), intent(in) :: from, through
-      real(dp), intent(in) :: part                     !! beyond the second one, relative to their distance
-      type(joint_state_type), intent(inout) :: next
-      integer :: c, j
-
-      next%level = through%level + part*(through%level - from%level)
-      do j = 1, size(next%s, 2)
-         next%s(:, j) = through%s(:, j) + part*(through%s(:, j) - from%s(:, j))
-         do c = 1, 2
-            next%t(:, c, j) = merge(through%t(:, c, j) + part*(through%t(:, c, j) - from%t(:, c, j)), 0.0_dp, &
-               next%s(:, j) >= 0.0_dp)
-         end do
-      end do
-   end subroutine extend_line
 
    !> Set the units of the equations, and make the first state from the contact.
    subroutine start(system, begun)
@@ -268,6 +200,7 @@ contains
          system%rules%soft_along = near%place(1, 1, 0, 0)
          near%slip = system%c*system%rules%soft_along*near%slip
          system%near = near
+         system%part = 1.0_dp
       end associate
    end subroutine find_responses
 
@@ -277,13 +210,14 @@ contains
       type(joint_state_type), intent(inout) :: state
 
       self%evaluations = self%evaluations + 1
+      if (abs(state%part - self%part) > 0.0_dp) call count_part(self, state%part)
       associate (contact => self%contact)
          contact%pressure(:, :) = self%rules%pressure_of(self%width, state%s)
          contact%traction(:, :, :) = state%t
          call self%operator%displace(contact%pressure, contact%gap)
          call self%operator%shear(contact%traction, contact%displacement, contact%slip)
-         if (self%displaced < 1.0_dp) contact%displacement = self%displaced*contact%displacement
-         if (self%stretched < 1.0_dp) contact%slip = self%stretched*contact%slip
+         contact%displacement = state%part*contact%displacement
+         if (self%slip_follows) contact%slip = state%part*contact%slip
          call read_road(contact, self%road, self%base, self%direction)
       end associate
       call compare(self, self%contact, state)

@@ -31,6 +31,7 @@ module steady_pace
    !> Rounds before the first attempt that does not start from the present contact. The next two follow after half as
    !> many rounds each.
    integer, parameter :: first_without_jump = 150
+   integer, parameter :: first_if_stalled = 64   !! the same if the rounds have hardly made any progress
    integer, parameter :: first_with_jump = 100   !! the same if the traction jumps at the edge of the contact
    integer, parameter :: compared = 8            !! rounds whose least change is compared with that of as many before
    integer, parameter :: patience = 25           !! least number of rounds between attempts from the present contact
@@ -40,6 +41,7 @@ module steady_pace
    real(dp), parameter :: near_on_flat = 1.0e-3_dp, near_on_slopes = 1.0e-2_dp
    real(dp), parameter :: price = 900.0_dp       !! transforms of such an attempt on a grid of ...
    real(dp), parameter :: priced_cells = 16384.0_dp   !! ... this number of cells; they grow like its square root
+   real(dp), parameter :: price_far = 32000.0_dp !! transforms of an attempt far from the solution, likewise
    real(dp), parameter :: least_progress = 1.0e-9_dp  !! decades per round of rounds that make no progress
 
    !> The pace of the rounds.
@@ -57,6 +59,8 @@ module steady_pace
       integer, private :: first_far = first_without_jump   !! round of the first attempt that is not from here
       real(dp), private :: near = near_on_flat       !! change below which an attempt from here is allowed
       integer, private :: next_attempt = 2*compared     !! first round in which one from here is allowed
+      real(dp), private :: least_so_far = huge(1.0_dp)  !! change, in the first half or in the second of the rounds before ...
+      real(dp), private :: least_before = huge(1.0_dp)  !! ... `first_if_stalled`; that of the first half
       real(dp), private :: recent(2*compared) = huge(1.0_dp)   !! changes of the last rounds
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
       real(dp) :: best = huge(1.0_dp)            !! error of the best contact so far
@@ -106,6 +110,7 @@ contains
 
       self%recent = [self%recent(2:), change]
       self%attempt = no_attempt
+      call check_progress(self, rounds, change, tolerance, cells)
       if (rounds == self%first_far) self%attempt = from_best
       if (2*rounds == 3*self%first_far) self%attempt = along_path
       if (rounds == 2*self%first_far) self%attempt = along_second_path
@@ -124,6 +129,26 @@ contains
       self%attempt = from_here
       self%next_attempt = rounds + max(patience, rounds/2)
    end subroutine choose_attempt
+
+   !> Attempt to solve all cells at once sooner if the second half of the first rounds has made hardly any progress.
+   subroutine check_progress(self, rounds, change, tolerance, cells)
+      class(pace_type), intent(inout) :: self
+      integer, intent(in) :: rounds              !! so far
+      real(dp), intent(in) :: change             !! of the last round
+      real(dp), intent(in) :: tolerance          !! of the change
+      real(dp), intent(in) :: cells              !! of the grid
+      real(dp) :: decades_per_round, expected
+
+      self%least_so_far = min(self%least_so_far, change)
+      if (2*rounds == first_if_stalled) then
+         self%least_before = self%least_so_far
+         self%least_so_far = huge(1.0_dp)
+      else if (rounds == first_if_stalled) then
+         decades_per_round = 2.0_dp*log10(self%least_before/self%least_so_far)/first_if_stalled
+         expected = log10(self%least_so_far/tolerance)*(6.0_dp + 2.0_dp*self%inner)/max(decades_per_round, least_progress)
+         if (expected > price_far*sqrt(cells/priced_cells)) self%first_far = min(self%first_far, first_if_stalled)
+      end if
+   end subroutine check_progress
 
    !> Count a plain step, and relax the next ones more strongly if plain steps make no progress.
    subroutine note_plain(self, change)
