@@ -109,7 +109,7 @@ contains
       call self%solve(system, now, v, step)
    end subroutine newton_step
 
-   !> Compute the unit tangent of a path at a solution, scaled, with a positive product with the normal of the plane.
+   !> Compute a tangent of a path at a solution, scaled: the one whose product with the normal of the plane is 1.
    subroutine tangent(self, system, now, step, found)
       class(joint_linear_type), intent(inout) :: self
       class(joint_system_type), intent(inout) :: system

@@ -149,12 +149,14 @@ contains
       product = row_total(rows)/system%root**2
    end function product
 
-   !> Free the field.
+   !> Free the fields.
    subroutine destroy(self)
       class(joint_plane_type), intent(inout) :: self
 
       self%active = .false.
       if (allocated(self%normal)) deallocate (self%normal)
+      if (allocated(self%listed%cells)) deallocate (self%listed%cells)
+      if (allocated(self%push%cells)) deallocate (self%push%cells)
    end subroutine destroy
 
    !> The distance of two states.

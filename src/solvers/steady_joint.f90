@@ -216,8 +216,10 @@ contains
          contact%traction(:, :, :) = state%t
          call self%operator%displace(contact%pressure, contact%gap)
          call self%operator%shear(contact%traction, contact%displacement, contact%slip)
-         contact%displacement = state%part*contact%displacement
-         if (self%slip_follows) contact%slip = state%part*contact%slip
+         if (abs(state%part - 1.0_dp) > 0.0_dp) then
+            contact%displacement = state%part*contact%displacement
+            if (self%slip_follows) contact%slip = state%part*contact%slip
+         end if
          call read_road(contact, self%road, self%base, self%direction)
       end associate
       call compare(self, self%contact, state)

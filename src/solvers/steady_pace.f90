@@ -59,8 +59,9 @@ module steady_pace
       integer, private :: first_far = first_without_jump   !! round of the first attempt that is not from here
       real(dp), private :: near = near_on_flat       !! change below which an attempt from here is allowed
       integer, private :: next_attempt = 2*compared     !! first round in which one from here is allowed
-      real(dp), private :: least_so_far = huge(1.0_dp)  !! change, in the first half or in the second of the rounds before ...
-      real(dp), private :: least_before = huge(1.0_dp)  !! ... `first_if_stalled`; that of the first half
+      ! Of the first `first_if_stalled` rounds:
+      real(dp), private :: least_before = huge(1.0_dp)  !! least change in their first half
+      real(dp), private :: least_so_far = huge(1.0_dp)  !! least change in the present half
       real(dp), private :: recent(2*compared) = huge(1.0_dp)   !! changes of the last rounds
       real(dp) :: accepted = 0.0_dp              !! change below which a solution is checked
       real(dp) :: best = huge(1.0_dp)            !! error of the best contact so far
