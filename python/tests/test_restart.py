@@ -83,6 +83,28 @@ def test_killed_before_the_root_group_was_written(program: str, tmp_path: Path) 
     assert not beginning.exists()
 
 
+@pytest.mark.parametrize(("groups", "replaced"), [
+    (["snapshots", "checkpoint", "grid", "history", "losses", "material", "surface"], True),
+    (["snapshots"], True),
+    (["snapshots", "grid", "measurement"], False),
+    (["surface"], False),
+])
+def test_killed_before_the_attributes_were_written(
+        program: str, tmp_path: Path, groups: list[str], replaced: bool) -> None:
+    """A kill may leave all groups of a result without any attribute; other files are kept."""
+    case = tmp_path / "case.nml"
+    case.write_text(vc.text())
+    beginning = tmp_path / "case.h5.new"
+    with h5py.File(beginning, "w") as file:
+        for group in groups:
+            file.create_group(group)
+    process = vc.start(program, case)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == (0 if replaced else 3), message
+    assert beginning.exists() == (not replaced)
+    assert replaced or "was not written by Asperity" in message
+
+
 def test_killed_at_any_moment(program: str, tmp_path: Path, reference: Path) -> None:
     """After each kill -9 the result can be opened, and the continued run has the same numbers."""
     case = tmp_path / "case.nml"

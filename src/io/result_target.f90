@@ -111,21 +111,31 @@ contains
          'removes it, or choose another --output')
    end subroutine check_replaced
 
-   !> Does this HDF5 file contain only what a result contains before its first attribute is written,
-   !> or can it or its root group not even be read?
+   !> Does this HDF5 file have only groups of a result, or can it or its root group not even be read?
+   !>
+   !> HDF5 writes the parts of a new file in an order of its own. After a kill all groups may be there while
+   !> no attribute can be read.
    function is_beginning(path) result(yes)
       character(*), intent(in) :: path
       logical :: yes
+      character(*), parameter :: first_group = 'snapshots'
+      character(*), parameter :: groups(7) = [character(10) :: first_group, 'checkpoint', 'grid', 'history', &
+         'losses', 'material', 'surface']
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
       character(256), allocatable :: names(:)
+      integer :: i
 
       call file%open(path, 'read', error)
       yes = allocated(error)
       if (yes) return
       call file%members('/', names, error)
-      yes = allocated(error)
-      if (.not. yes) yes = all(names == 'snapshots')
+      if (allocated(error)) then
+         yes = .true.
+      else
+         yes = (size(names) == 0 .or. any(names == first_group)) &
+            .and. all([(any(groups == names(i)), i=1, size(names))])
+      end if
       call file%close(error)
    end function is_beginning
 
