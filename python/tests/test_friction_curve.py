@@ -1,6 +1,7 @@
 """Friction curves: points equal single runs, intervals cover the mean, ways of running agree."""
 
 import csv
+import importlib.util
 import json
 import os
 import re
@@ -177,11 +178,52 @@ def test_points_that_do_not_converge_are_left_out(tmp_path):
     hard = HardPlan(**{name: getattr(plan, name) for name in plan.__dataclass_fields__})
     curve = curve_of(hard, tmp_path)
     assert np.isnan(curve.values["friction"]).all()
-    assert any("3 points did not converge and are left out" in note for note in curve.notes)
+    assert len(curve.warnings) == 1
+    assert "[1] 3 of 3 points did not converge and are left out (0.001 to 0.1 m/s): the limit of" \
+        in curve.warnings[0]
+    assert [row[-3:] for row in curve.rows()] == [(0, 1, 0)] * 3
+    assert curve.states_with(lost=True).all() and not curve.states_with(lost=False).any()
+    assert curve.summary().count("  [1]\n") == 3
+    if "xarray" in sys.modules or importlib.util.find_spec("xarray"):
+        found = curve.to_xarray()
+        assert not found["converged"].any() and "did not converge" in found.attrs["warnings"]
+    crosses = [line for axes in curve.plot().axes for line in axes.lines
+               if line.get_marker() == "x" and len(line.get_xdata()) == 3]
+    assert len(crosses) == 2  # one in each panel, at the lower edge
+    page = curve.to_html(tmp_path / "curve.html").read_text(encoding="utf-8")
+    assert "did not converge and are left out" in page and '"0,0,2":"[1]"' in page
     before = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
     assert len(before) == 4  # one for a map, and a run for each speed
     curve_of(hard, tmp_path)
     assert before == {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("*.h5")}
+
+
+def test_warnings_of_runs_reach_the_curve(tmp_path, capsys):
+    """Only the light contact has too few cells, although the same runs contain wide ones."""
+    (tmp_path / "rubber.nml").write_text(NAMELIST)
+    words = ["friction", ROAD, "--material", str(tmp_path / "rubber.nml"), "--speeds",
+             "1e-3,1e-1", "--pressures", "10,2e5", "--cells", "32", "--patches", "2", "--quiet"]
+    for end in ("csv", "html", "png"):
+        words += ["-o", str(tmp_path / f"curve.{end}")]
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    kinds = [line for line in printed.splitlines() if line.startswith("warning [")]
+    assert len(kinds) == 1
+    assert "2 of 4 points (10 Pa: 0.001 to 0.1 m/s): patches of contact are only" in kinds[0]
+    with (tmp_path / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["with_warnings"] for row in rows] == ["2", "2", "0", "0"]
+    assert {row["not_converged"] for row in rows} == {"0"}
+    page = (tmp_path / "curve.html").read_text(encoding="utf-8")
+    assert '"marks":{"0,0,0":"[1]","0,0,1":"[1]"}' in page
+    assert "<strong>Warnings</strong>" in page
+    pytest.importorskip("xarray")
+    with pytest.warns(UserWarning, match="2 of 4 points"):
+        found = asperity.friction_curve(
+            ROAD, RUBBER, speeds=[1e-3, 1e-1], pressures=[10.0, 2e5], cells=32, patches=2,
+            quiet=True, folder=tmp_path / "runs", jobs=1)
+    assert found["warned"].values[:, 0].tolist() == [[[1, 1], [1, 1]], [[0, 0], [0, 0]]]
+    assert found["converged"].all() and "patches of contact" in found.attrs["warnings"]
 
 
 # ---- ways of running -------------------------------------------------------------------------
@@ -387,7 +429,8 @@ def test_table(curve, tmp_path):
         rows = list(csv.reader(file))
     assert tuple(rows[0]) == COLUMNS == (
         "pressure", "temperature", "speed", "friction", "friction_low", "friction_high",
-        "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches")
+        "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches",
+        "not_converged", "with_warnings")
     assert len(rows) == 1 + 2 * 2 * 3
     values = np.array(rows[1:], dtype=float)
     assert values[0, :3].tolist() == [1e5, 20.0, 1e-3]

@@ -112,6 +112,21 @@ def test_one_phase_with_large_patches_is_enough():
     assert warned(sphere(8.0, "&phase force = {force} /\n&phase force = 1e-9 /")) == 0
 
 
+def test_each_state_of_steady_sliding_has_its_own_warning():
+    """Wide patches under one load say nothing about those under another one."""
+    light, heavy = (f"&phase steady = .true., velocity_x = 1., pressure = {pressure:g} /\n"
+                    for pressure in (1e-5, 1e-2))
+    case = """
+&grid nx = 32, ny = 32, lx = 1. /
+&surface shape = 'hexagonal_wave', amplitude = 0.01, wavelength = 1. /
+&material shear_modulus = 0.25, prony_g = 0.25, prony_tau = 0.1, poisson = 0.5 /
+"""
+    for phases, steps in ((light + heavy, ["step 0"]), (heavy, []),
+                          (heavy + light + light, ["step 1", "step 2"])):
+        run = asperity.run(case + phases, output=f"case{len(phases)}.h5")
+        assert [line.split(",")[0] for line in run.warnings if WORDS in line] == steps
+
+
 @pytest.mark.parametrize(("cells_a_wave", "times"), [(2.5, 1), (16, 0)])
 def test_rough_contact(cells_a_wave, times):
     case = f"""

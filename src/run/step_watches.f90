@@ -3,7 +3,7 @@ module step_watches
    use asperity_precision, only : dp
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
-   use contact_size, only : measured_patches, watch_contact_size
+   use contact_size, only : measured_patches, patch_size_type, size_warning, watch_contact_size
    use map_edge, only : check_edge
    use stick_slip_watch, only : watch_slip
    use text_tools, only : add_line, to_text
@@ -28,17 +28,23 @@ contains
       call add_warning(warnings, contact%state%schedule%row, plan%time, message)
    end subroutine watch_edge
 
-   !> Check the size of the patches of contact at the end of a phase.
+   !> Check the size of the patches of contact at the end of a phase. A state of steady sliding is a result of its own,
+   !> about which wider patches in another state say nothing: it has its own warning.
    subroutine watch_cells(contact, plan, warnings)
       class(contact_type), intent(inout) :: contact
       type(planned_row_type), intent(in) :: plan
       character(:), allocatable, intent(inout) :: warnings
+      type(patch_size_type) :: patches
       character(:), allocatable :: message
 
       associate (state => contact%state)
          if (state%schedule%phase == plan%phase) return
-         call watch_contact_size(contact%grid, measured_patches(contact%grid, contact%normal%adhesive, &
-            state%pressure, state%gap), state%schedule%phase > size(contact%case%phases), &
+         patches = measured_patches(contact%grid, contact%normal%adhesive, state%pressure, state%gap)
+         if (plan%steady) then
+            call add_warning(warnings, state%schedule%row, plan%time, size_warning(contact%grid, patches))
+            patches = patch_size_type()  ! the other phases are judged without it
+         end if
+         call watch_contact_size(contact%grid, patches, state%schedule%phase > size(contact%case%phases), &
             state%widest, message)
          call add_warning(warnings, state%schedule%row, plan%time, message)
       end associate

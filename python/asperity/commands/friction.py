@@ -175,7 +175,7 @@ def _friction(chosen: argparse.Namespace) -> int:
     except SubmittedError as message:
         print(message)
         return 0
-    print(curve.summary())
+    print(curve.summary(plan.all_notes))
     for output in outputs:
         print(f"wrote {_write(curve, output)}")
     return 0 if np.isfinite(curve.values["friction"]).all() else 4

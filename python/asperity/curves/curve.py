@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -129,6 +130,12 @@ def friction_curve(
         If an argument is wrong, or a file cannot be read.
     RuntimeError
         If runs fail, or were submitted to Slurm and are not there yet.
+
+    Warns
+    -----
+    UserWarning
+        For each kind of warning of the runs, and each reason of states without a solution, with the
+        points that it concerns. The variables `warned` and `converged` contain the same.
     """
     sources = list(roads) if isinstance(roads, list | tuple) else [roads]
     road = road_of(sources, cells=cells, side=side, join=join, short=short, outliers=outliers,
@@ -138,7 +145,10 @@ def friction_curve(
                       temperatures=temperatures, patches=patches, coefficient=coefficient,
                       slope_effect=slope_effect, angle=angle, tolerance=tolerance)
     means = Means(*share_of_processors(jobs, threads), resume, executor, slurm)
-    return run_curve(plan, folder, means, error=error, extend=extend, quiet=quiet).to_xarray()
+    curve = run_curve(plan, folder, means, error=error, extend=extend, quiet=quiet)
+    for line in curve.warnings:
+        warnings.warn(line, UserWarning, stacklevel=2)
+    return curve.to_xarray()
 
 
 def run_curve(

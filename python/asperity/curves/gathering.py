@@ -17,6 +17,7 @@ from ..roads.joins import load_at_join
 from ..roads.patches import Patch
 from ..roads.spectra import Spectrum
 from .plan import CurvePlan
+from .remarks import remarks_of
 from .running import Piece
 
 __all__ = ["GAMMA", "gather"]
@@ -51,9 +52,8 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
     values = {name: np.full((*axes, plan.patches), math.nan) for name in _NAMES}
     sources: dict[tuple[int, int, int], tuple[Path, int]] = {}
     lost: list[tuple[Piece, int, Run]] = []
-    missing = []
     for piece, _ in pieces:
-        run, rows, finished = piece.rows()
+        run, rows, _ = piece.rows()
         for row in range(rows):
             at = (piece.i, piece.j, piece.first + row)
             for name in _NAMES:
@@ -61,21 +61,15 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
             if piece.patch == 0:
                 sources[at] = (piece.job.path, int(run.history["step"][row]))
         lost.append((piece, rows, run))
-        if not finished:
-            missing.append(f"{plan.speed[piece.first + rows]:.4g} m/s on patch {piece.patch}")
     values["friction_interface"] = values["friction"] - values["friction_viscous"]
-    notes = [*plan.road.notes, *plan.compound.notes, *plan.notes]
-    if missing:
-        notes.append(f"{len(missing)} points did not converge and are left out: "
-                     + ", ".join(missing[:5]) + (" and others" if len(missing) > 5 else ""))
-    notes += _join_note(plan, lost)
+    notes = [*plan.all_notes, *_join_note(plan, lost)]
     losses, octave = _losses(plan, lost)
     return FrictionCurve(
         plan.pressure, plan.temperature, plan.speed, _labels(pieces), values,
         _theory(plan, pieces, extend), losses, octave, plan.compound.series.tau,
         np.array([plan.compound.a_t(float(t)) for t in plan.temperature]),
         np.array([plan.compound.b_t(float(t)) for t in plan.temperature]), sources,
-        _settings(plan, extend), notes)
+        _settings(plan, extend), notes, remarks_of(plan, [piece for piece, _ in pieces]))
 
 
 def _labels(pieces: list[tuple[Piece, Patch]]) -> list[str]:

@@ -78,6 +78,11 @@ class CurvePlan:
         """Number of steady states."""
         return self.patches * self.speed.size * self.pressure.size * self.temperature.size
 
+    @property
+    def all_notes(self) -> list[str]:
+        """Remarks about the road, the rubber and the plan, each once."""
+        return list(dict.fromkeys([*self.road.notes, *self.compound.notes, *self.notes]))
+
     def case(self, patch: Patch, file: str, i: int, j: int, first: int = 0) -> Case:
         """Return the case of a patch at one pressure and temperature: a phase for each speed.
 
@@ -195,8 +200,7 @@ class CurvePlan:
             " processors have nothing else to do",
             f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
         ]
-        return "\n".join([*lines, *(f"note       {note}" for note in [
-            *self.road.notes, *self.compound.notes, *self.notes])])
+        return "\n".join([*lines, *(f"note       {note}" for note in self.all_notes)])
 
 
 def plan_curve(

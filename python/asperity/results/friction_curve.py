@@ -6,7 +6,7 @@ Arrays have the dimensions (pressure, temperature, speed, patch), or the first t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..base.optional import needed
 from ..base.presenters import present
+from .curve_remarks import CurveRemark, marks_of
 
 if TYPE_CHECKING:
     import xarray
@@ -25,7 +26,8 @@ __all__ = ["COLUMNS", "MEANINGS", "FrictionCurve", "interval"]
 FloatArray = NDArray[np.float64]
 
 COLUMNS = ("pressure", "temperature", "speed", "friction", "friction_low", "friction_high",
-           "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches")
+           "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches",
+           "not_converged", "with_warnings")
 
 #: Units and meaning of each variable.
 MEANINGS = {
@@ -42,6 +44,9 @@ MEANINGS = {
     "friction_left_out": ("1", "friction that the omitted waves would add by Persson's theory"),
     "loss_octave": ("W/m2", "loss in the rubber by octave of the wavelength, mean over patches"),
     "loss_arm": ("W/m2", "loss in the rubber by arm of the Prony series, mean over patches"),
+    "converged": ("1", "1 if the solver has converged; 0 for a state that is left out"),
+    "warned": ("1", "sum of 2^(n - 1) over the warnings n about the state, which are numbered in"
+                    " the attribute `warnings`"),
     "octave": ("m", "longest wavelength of the octave"),
     "relaxation_time": ("s", "relaxation time of the arm at the reference temperature"),
     "a_t": ("1", "shift of the relaxation times"),
@@ -113,6 +118,8 @@ class FrictionCurve:
         Settings of the computation.
     notes : list of str
         Notes for the user.
+    remarks : list of CurveRemark
+        Warnings of the runs, and the states at which the solver did not converge.
     """
 
     pressure: FloatArray
@@ -129,6 +136,36 @@ class FrictionCurve:
     sources: dict[tuple[int, int, int], tuple[Path, int]] = field(default_factory=dict, repr=False)
     settings: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    remarks: list[CurveRemark] = field(default_factory=list)
+
+    @property
+    def axes(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Pressures, temperatures and speeds."""
+        return self.pressure, self.temperature, self.speed
+
+    @property
+    def warnings(self) -> list[str]:
+        """The remarks as text, each with its number and the points that it concerns."""
+        return [f"[{number}] {remark.line(self.axes)}"
+                for number, remark in enumerate(self.remarks, 1)]
+
+    def states_with(self, *, lost: bool) -> NDArray[np.bool_]:
+        """Return the states without a solution, or those with warnings.
+
+        Parameters
+        ----------
+        lost : bool
+            Whether the states at which the solver did not converge are wanted.
+
+        Returns
+        -------
+        ndarray of bool, shape (pressure, temperature, speed, patch)
+        """
+        found = np.zeros(self.values["friction"].shape, dtype=bool)
+        for remark in self.remarks:
+            if remark.is_lost == lost:
+                found |= remark.where
+        return found
 
     def mean(self, name: str) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return mean and 95 % interval of a variable over the patches.
@@ -165,6 +202,7 @@ class FrictionCurve:
         means = {name: self.mean(name) for name in ("friction", "friction_viscous", "contact_area",
                                                     "mean_gap")}
         count = interval(self.values["friction"])[3]
+        lost, warned = (self.states_with(lost=lost).sum(axis=-1) for lost in (True, False))
         rows = []
         for i, j, k in np.ndindex(count.shape):
             at = (i, j, k)
@@ -173,7 +211,7 @@ class FrictionCurve:
                 *(float(part[at]) for part in means["friction"]),
                 float(means["friction_viscous"][0][at]), float(means["contact_area"][0][at]),
                 float(means["mean_gap"][0][at]), float(self.theory["friction_persson"][at]),
-                int(count[at])))
+                int(count[at]), int(lost[at]), int(warned[at])))
         return rows
 
     def to_csv(self, path: str | Path) -> Path:
@@ -241,10 +279,18 @@ class FrictionCurve:
                                        for name in axes}
         coordinates["patch"] = ("patch", np.arange(len(self.patches)))
         coordinates["octave"] = ("octave", self.octave, described("octave"))
+        lost = self.states_with(lost=True)
+        warned = sum((remark.where.astype(np.int32) << number
+                      for number, remark in enumerate(self.remarks[:31])),
+                     np.zeros(lost.shape, dtype=np.int32))
+        variables["converged"] = ((*axes, "patch"), (~lost).astype(np.int8),
+                                  described("converged"))
+        variables["warned"] = ((*axes, "patch"), warned, described("warned"))
         settings = {name: str(value) for name, value in self.settings.items()}
         return xarray.Dataset(variables, coordinates,
                               {**settings, "patches": "\n".join(self.patches),
-                               "notes": "\n".join(self.notes)})
+                               "notes": "\n".join(self.notes),
+                               "warnings": "\n".join(self.warnings)})
 
     def to_netcdf(self, path: str | Path) -> Path:
         """Write all data as a netCDF file (classic format).
@@ -299,19 +345,36 @@ class FrictionCurve:
         """
         return present("write_curve_page", self, path)
 
-    def summary(self) -> str:
-        """Return the table and the notes as text."""
+    def summary(self, known_notes: Iterable[str] = ()) -> str:
+        """Return the table, the notes and the warnings as text.
+
+        A row of the table ends with the numbers of the warnings about its point.
+
+        Parameters
+        ----------
+        known_notes : iterable of str
+            Notes that are left out, because the user has read them before.
+
+        Returns
+        -------
+        str
+        """
         heads = ("p (Pa)", "T (C)", "v (m/s)", "friction", "95 % interval", "viscous", "area",
                  "Persson", "patches")
         lines = ["  ".join(head.rjust(max(9, len(head))) for head in heads)]
-        for row in self.rows():
+        points = np.ndindex(self.values["friction"].shape[:3])
+        for at, row in zip(points, self.rows(), strict=True):
             low, high = row[4:6]
             known = f"{low:.4f}..{high:.4f}" if math.isfinite(low) else "-"
             cells = (f"{row[0]:.4g}", f"{row[1]:g}", f"{row[2]:.4g}", f"{row[3]:.4f}", known,
                      f"{row[6]:.4f}", f"{row[7]:.4g}", f"{row[9]:.4f}", str(row[10]))
             lines.append("  ".join(cell.rjust(max(9, len(head)))
-                                   for cell, head in zip(cells, heads, strict=True)))
-        return "\n".join([*lines, *(f"note: {note}" for note in self.notes)])
+                                   for cell, head in zip(cells, heads, strict=True))
+                         + f"  {marks_of(self.remarks, at)}".rstrip())
+        known_notes = set(known_notes)
+        return "\n".join([*lines, *(f"note: {note}" for note in self.notes
+                                    if note not in known_notes),
+                          *(f"warning {line}" for line in self.warnings)])
 
     def settings_text(self) -> Mapping[str, str]:
         """Return the settings of the computation as text."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..base.library import version
 from ..base.names import counted
 from ..results import open_result
+from ..results.curve_remarks import marks_of
 from .page_parts import colour_scales, fill_page, page_file, page_json
 from .report_data import blocks, now, packed
 from .style import typeset
@@ -62,7 +63,7 @@ def curve_page(curve: FrictionCurve) -> str:
     """Return the page of a curve as text."""
     data = _data(curve)
     title = str(curve.settings.get("title", "Friction"))
-    sections = [("curves", "Curves", _curves_section()), ("point", "Chosen point",
+    sections = [("curves", "Curves", _curves_section(curve)), ("point", "Chosen point",
                                                           _point_section(data)),
                 ("table", "Table", _table(curve)), ("how", "How it was made", _settings(curve))]
     parts = {
@@ -117,6 +118,8 @@ def _data(curve: FrictionCurve) -> dict[str, Any]:
                  for name in ("pressure", "temperature", "speed")},
         "a_t": _numbers(curve.a_t), "values": values, "names": _NAMES,
         "losses": {name: _numbers(array) for name, array in curve.losses.items()},
+        "marks": {",".join(map(str, at)): marks for at in np.ndindex(curve.theory[
+            "friction_persson"].shape) if (marks := marks_of(curve.remarks, at))},
         "octave": _numbers(curve.octave), "relaxation": _numbers(curve.relaxation_time),
         "maps": maps, "grid": grid, "colours": colour_scales()}
 
@@ -141,17 +144,22 @@ def _maps(curve: FrictionCurve) -> tuple[dict[str, Any], dict[str, Any]]:
     return maps, grid
 
 
-def _curves_section() -> str:
+def _curves_section(curve: FrictionCurve) -> str:
     """Return the charts and the controls above them."""
+    signs = ""
+    if curve.remarks:
+        signs = (" A ring marks a point with warnings, which are listed above; a cross at the lower"
+                 " edge stands for a point at which no patch has a solution.")
     return ('<p class="soft">Mean over the patches with its 95 % interval. The dashed line is'
             " Persson's theory for the same roughness. Click on a point to see where it touches and"
-            ' where it loses energy.</p>\n<div class="choices" id="choices"></div>\n'
+            f' where it loses energy.{signs}</p>\n<div class="choices" id="choices"></div>\n'
             '<div class="charts" id="curves"></div>')
 
 
 def _point_section(data: dict[str, Any]) -> str:
     """Return the energy losses and the pressure map of the chosen point."""
-    parts = ['<p>At <strong id="point"></strong>:</p>']
+    parts = ['<p>At <strong id="point"></strong>:</p>',
+             '<p class="warn" id="point-warnings"></p>']
     if data["losses"]:
         parts.append('<div class="charts" id="losses"></div>')
     if data["maps"]:
@@ -160,20 +168,24 @@ def _point_section(data: dict[str, Any]) -> str:
 
 
 def _notes(curve: FrictionCurve) -> str:
-    """Return the box of notes, empty without notes."""
-    if not curve.notes:
-        return ""
-    lines = "".join(f"<li>{escape(typeset(note))}</li>" for note in curve.notes)
-    return f'<div class="note"><p><strong>Notes</strong></p><ul>{lines}</ul></div>'
+    """Return the boxes of warnings and notes, empty without any."""
+    boxes = ""
+    for head, texts in (("Warnings", curve.warnings), ("Notes", curve.notes)):
+        if texts:
+            lines = "".join(f"<li>{escape(typeset(text))}</li>" for text in texts)
+            boxes += f'<div class="note"><p><strong>{head}</strong></p><ul>{lines}</ul></div>'
+    return boxes
 
 
 def _table(curve: FrictionCurve) -> str:
     """Return the table of the means."""
     heads = ("pressure (Pa)", "temperature (°C)", "speed (m/s)", "friction", "low", "high",
-             "viscous", "contact area", "mean gap (m)", "Persson", "patches")
+             "viscous", "contact area", "mean gap (m)", "Persson", "patches", "warnings")
     top = "".join(f"<th>{head}</th>" for head in heads)
-    body = "".join("<tr>" + "".join(f"<td>{_cell(value)}</td>" for value in row) + "</tr>"
-                   for row in curve.rows())
+    shown = [(*(_cell(value) for value in row[:11]), escape(marks_of(curve.remarks, at)))
+             for at, row in zip(np.ndindex(curve.theory["friction_persson"].shape), curve.rows(),
+                                strict=True)]
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in shown)
     return (f'<div class="wide"><table class="points"><thead><tr>{top}</tr></thead>'
             f"<tbody>{body}</tbody></table></div>")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,18 +11,23 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from .style import COLOURS, DOUBLE_COLUMN, print_style, shown_once, si_scale
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from ..results.friction_curve import FrictionCurve
 
 __all__ = ["plot_friction_curve"]
+
+_MARKERS = "o", "x"  # of points with warnings, and of those with states that are left out
 
 
 def plot_friction_curve(curve: FrictionCurve) -> Figure:
     """Draw friction and contact area with their 95 % intervals; Persson's theory is dashed.
 
     They are drawn against the speed or, for a single speed, against the pressure or the
-    temperature. Each combination of the other two has its own colour.
+    temperature. Each combination of the other two has its own colour. Rings mark points with
+    warnings, crosses those at which states are left out because the solver did not converge.
 
     Parameters
     ----------
@@ -46,6 +51,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         figure, places = plt.subplots(1, len(panels), figsize=(DOUBLE_COLUMN, 2.8),
                                       layout="constrained")
         others = [name for name in order if name != along]
+        flagged = [np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True)]
         for number, at in enumerate(np.ndindex(*(axes[name].size for name in others))):
             where = list(at)
             where.insert(place, slice(None))
@@ -56,6 +62,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
                 mean, low, high = (part[tuple(where)] for part in curve.mean(name))
                 panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
                 panel.plot(axes[along], mean, "o-", color=colour, label=label or "runs")
+                _mark(panel, axes[along], mean, [one[tuple(where)] for one in flagged], colour)
                 if theory:
                     panel.plot(axes[along], curve.theory[theory][tuple(where)], "--",
                                color=colour, linewidth=0.9)
@@ -73,11 +80,33 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         places[-1].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         places[-1].yaxis.set_minor_formatter(NullFormatter())
         places[0].plot([], [], "k--", linewidth=0.9, label="Persson's theory")
+        for some, marker, text in zip(flagged, _MARKERS, ("with warnings", "not converged"),
+                                      strict=True):
+            if some.any():
+                places[0].plot([], [], marker, color="k", fillstyle="none", markersize=7,
+                               label=text)
         # Beside the panels: the intervals may fill them.
         figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center",
                       frameon=False, ncols=4)
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return shown_once(figure)
+
+
+def _mark(panel: Axes, x: NDArray[Any], y: NDArray[Any], flagged: list[NDArray[np.bool_]],
+          colour: str) -> None:
+    """Draw rings around points with warnings, and crosses where states are left out.
+
+    A cross is at the lower edge if no patch has a value.
+    """
+    warned, lost = flagged
+    known = np.isfinite(y)
+    edge, inside = panel.get_xaxis_transform(), panel.transData
+    for some, marker, height, transform in (
+            (warned, _MARKERS[0], y, inside), (lost & known, _MARKERS[1], y, inside),
+            (lost & ~known, _MARKERS[1], np.full(y.shape, 0.03), edge)):
+        if some.any():  # without points, a line that is not clipped upsets the layout
+            panel.plot(x[some], height[some], marker, color=colour, fillstyle="none", markersize=7,
+                       clip_on=False, transform=transform)
 
 
 def _words(name: str, value: float) -> str:

@@ -100,7 +100,8 @@ let charts = 0;
 
 /**
  * A line chart. `options`: title, label, unit, log, logX, zero (y starts at 0), series of {label,
- * colour, dash, marks, x, y, low, high} (between low and high a line has a ribbon), levels of
+ * colour, dash, marks, x, y, low, high, flags} (between low and high a line has a ribbon; points with
+ * a text in flags have a ring, or a cross at the lower edge if they have no y), levels of
  * {value, label}, bands of {from, to, state}, xLabel, xUnit, and pick, which is called with the x
  * that was clicked and the number of the nearest line. `group`: charts that zoom along x together.
  */
@@ -154,6 +155,9 @@ class Chart {
       if (line.low) {
         columns.push({name: withUnit(`${line.label} low`, unit), values: line.low},
           {name: withUnit(`${line.label} high`, unit), values: line.high});
+      }
+      if (line.flags && line.flags.some(Boolean)) {
+        columns.push({name: `${line.label} warnings`, values: line.flags});
       }
     }
     saveCsv(title, columns);
@@ -341,6 +345,7 @@ class Chart {
       inside.append(svg("line", {x1: x, x2: x, y1: box.top, y2: box.bottom, class: "mark"}));
     }
     for (const line of visible) this.drawLine(inside, line);
+    for (const line of visible) this.drawFlags(root, line);
     this.pointer = svg("g");
     root.append(this.pointer);
     this.selection = svg("rect", {class: "selection", y: box.top, width: 0,
@@ -403,12 +408,29 @@ class Chart {
     }
   }
 
+  /** Mark the points of a line about which there is something to know. */
+  drawFlags(root, line) {
+    if (!line.flags) return;
+    const {left, right, top, bottom} = this.box;
+    line.flags.forEach((text, i) => {
+      const x = line.x[i] === null ? NaN : this.px(this.toX(line.x[i]));
+      if (!text || !(x >= left - 1 && x <= right + 1)) return;
+      const y = line.y[i] === null ? NaN : this.py(this.toY(line.y[i]));
+      if (y < top - 1 || y > bottom + 1) return;
+      const low = bottom - 7;
+      const sign = Number.isFinite(y) ? svg("circle", {cx: x, cy: y, r: 6, class: "flag"})
+        : svg("path", {class: "flag", d: `M${x - 5} ${low - 5}l10 10m0 -10l-10 10`});
+      sign.append(svg("title", {}, text));
+      root.append(sign);
+    });
+  }
+
   /** Read the values next to an x. */
   read(x) {
     let best = null, near = Infinity;
     for (const line of this.options.series) {
       for (let i = 0; i < line.x.length; i++) {
-        if (line.x[i] === null || line.y[i] === null) continue;
+        if (line.x[i] === null || (line.y[i] === null && !(line.flags && line.flags[i]))) continue;
         const distance = Math.abs(this.toX(line.x[i]) - x);
         if (distance < near) { near = distance; best = line.x[i]; }
       }
@@ -435,9 +457,11 @@ class Chart {
       // Of two rows at one place, before and after a jump, the later one.
       const i = line.x.lastIndexOf(cursor);
       const value = i < 0 ? null : line.y[i];
+      const flag = i < 0 || !line.flags ? null : line.flags[i];
+      if (value === null && !flag) return;
+      told.push(`${line.label} ${options.log ? digits(value) + (options.unit === "1" || value === null
+        ? "" : " " + options.unit) : shown(value, options.unit)}${flag ? " " + flag : ""}`);
       if (value === null) return;
-      told.push(`${line.label} ${options.log ? digits(value) +
-        (options.unit === "1" ? "" : " " + options.unit) : shown(value, options.unit)}`);
       const y = this.py(this.toY(value));
       if (Number.isFinite(y) && y >= this.box.top && y <= this.box.bottom && x >= this.box.left - 1) {
         this.pointer.append(svg("circle", {cx: x, cy: y, r: 4, class: `fill${line.colour} dot`}));

@@ -10,6 +10,11 @@ function valueAt(name, at) {
   return data.values[name][at.pressure][at.temperature][at.speed];
 }
 
+/** The numbers of the warnings about a point, as "[1] [3]"; empty if there are none. */
+function marksAt(at) {
+  return data.marks[`${at.pressure},${at.temperature},${at.speed}`] || "";
+}
+
 /** The words for a point without one of its axes. */
 function words(at, without) {
   return AXES.filter((name) => name !== without && data.axes[name].length > 1)
@@ -54,7 +59,8 @@ function lines(name, more = {}) {
     colour: number % 7, dash: more.dash || "", x: points.map(xOf),
     y: points.map((at) => valueAt(name, at)),
     low: more.band ? points.map((at) => valueAt(`${name}_low`, at)) : null,
-    high: more.band ? points.map((at) => valueAt(`${name}_high`, at)) : null}));
+    high: more.band ? points.map((at) => valueAt(`${name}_high`, at)) : null,
+    flags: more.band ? points.map(marksAt) : null}));
 }
 
 /** The choices above the charts. */
@@ -135,6 +141,7 @@ const map = pointMap();
 const parent = document.getElementById("curves");
 const made = [];
 const label = document.getElementById("point");
+const remarks = document.getElementById("point-warnings");
 
 function choose(x, number) {
   const many = curves();
@@ -180,6 +187,8 @@ function show() {
     drawn.update(seriesOf(chart), axisOptions());
   }
   label.textContent = told(chosen);
+  const marks = marksAt(chosen);
+  remarks.textContent = marks ? `Warnings ${marks} concern this point.` : "";
   losses();
   map();
 }
