@@ -1,6 +1,7 @@
 """Friction curves: points equal single runs, intervals cover the mean, ways of running agree."""
 
 import csv
+import errno
 import importlib.util
 import json
 import os
@@ -297,7 +298,8 @@ def test_the_same_after_a_stop(tmp_path, number):
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "results are there already" in done.stderr
     stopped = (tmp_path / "curve.csv").read_text()
-    subprocess.run([*words[:-1], "anew", "--quiet"], cwd=tmp_path, capture_output=True, check=True)
+    subprocess.run([*words[:-1], "anew", "--quiet", "--overwrite"], cwd=tmp_path,
+                   capture_output=True, check=True)
     assert (tmp_path / "curve.csv").read_text() == stopped
 
 
@@ -642,6 +644,14 @@ def test_rubber_of_several_kinds(tmp_path):
 @pytest.mark.parametrize("words, message", [
     (["self_affine:hurst=0.8", "--material", "r.nml"], "lacks wavelength_long"),
     (["self_affine:hurts=0.8", "--material", "r.nml"], "NAME one of hurst"),
+    ([ROAD.replace("long=1e-3", "long=1e-4"), "--material", "r.nml"],
+     "self_affine: wavelength_long = 0.0001: must be > wavelength_short = 0.00025"),
+    ([ROAD.replace("long=1e-3", "long=-1e-3"), "--material", "r.nml"],
+     "self_affine: wavelength_long = -0.001: must be > wavelength_short"),
+    ([ROAD + ",wavelength_rolloff=2e-3", "--material", "r.nml"],
+     "self_affine: wavelength_rolloff = 0.002: must be from wavelength_short = 0.00025 to"),
+    ([ROAD.replace("hurst=0.8", "hurst=2"), "--material", "r.nml"], "self_affine: hurst = 2.0"),
+    ([ROAD + ",hurst=0.7", "--material", "r.nml"], "self_affine: hurst is given twice"),
     ([ROAD, "--material", "r.nml", "--speeds", "1,1"], "speeds: 1 is given twice"),
     ([ROAD, "--material", "r.nml", "--pressures=-1"], "pressures"),
     ([ROAD, "--material", "r.nml", "--patches", "0"], "patches = 0"),
@@ -682,6 +692,80 @@ def test_roads_that_are_refused(tmp_path, monkeypatch, capsys, height, message):
     asperity.surface.save("road.h5", height, 1e-3, 1e-3)
     assert main(["friction", "road.h5", "--material", "r.nml", "--cells", "16"]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_notes_are_printed_once(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    height = asperity.surface.self_affine(96, lx=1e-3, wavelength_long=2e-4, wavelength_short=8e-5,
+                                          rms_slope=0.1, seed=3)
+    asperity.surface.save("a.h5", height, 1e-3, boundary="free")
+    assert main(["friction", "a.h5", "--material", "r.nml", "--cells", "32", "--speeds", "1",
+                 "--quiet", "-o", "c.csv"]) == 0
+    printed = capsys.readouterr().out
+    for note in ("the maps have room for 4 patches", "its own footprint", "lies at the join"):
+        assert printed.count(note) == 1, note
+
+
+def test_only_outputs_of_the_same_plan_are_replaced(tmp_path, monkeypatch, capsys):
+    """An output of another plan, or of somebody else, is refused before anything is run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    words = ["friction", ROAD, "--material", "r.nml", "--cells", "32", "--patches", "1", "--quiet",
+             "--speeds", "1", "-o", "c.csv", "-o", "c.html"]
+    assert main(words) == 0
+    first = (tmp_path / "c.csv").read_text()
+    assert main(words) == 0  # the same plan replaces its own files
+    runs = sorted((tmp_path / "c_runs").iterdir())
+    capsys.readouterr()
+
+    other = [*words, "--pressures", "1e5"]
+    assert main(other) == 3
+    assert "c.csv: is the curve of another plan: --overwrite" in capsys.readouterr().err
+    assert main([*words, "--folder", "others"]) == 3
+    assert "others has no record that `asperity friction` wrote it" in capsys.readouterr().err
+    assert not (tmp_path / "others").exists() and sorted((tmp_path / "c_runs").iterdir()) == runs
+    assert main([*other, "--plan"]) == 0  # writes nothing
+    assert (tmp_path / "c.csv").read_text() == first
+
+    (tmp_path / "c.csv").write_text(first + "my own note\n")
+    assert main(words) == 3
+    assert "wrote it as it is now" in capsys.readouterr().err
+    assert (tmp_path / "c.csv").read_text() == first + "my own note\n"
+    assert main([*other, "--overwrite"]) == 0
+    assert (tmp_path / "c.csv").read_text().splitlines()[1].startswith("100000.0,")
+    assert main(other) == 0
+    assert not [path for path in tmp_path.iterdir() if ".new" in path.name]
+
+
+def test_outputs_never_replace_an_input(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.csv").write_text(NAMELIST)
+    assert main(["friction", ROAD, "--material", "r.csv", "-o", "r.csv", "--overwrite"]) == 2
+    assert "--output r.csv: is an input: name another file" in capsys.readouterr().err
+    (tmp_path / "c.html").mkdir()
+    assert main(["friction", ROAD, "--material", "r.csv", "-o", "c.html", "--overwrite"]) == 3
+    assert "c.html: is a folder: name a file in it" in capsys.readouterr().err
+
+
+def test_a_full_disk_leaves_the_file_of_before(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    words = ["friction", ROAD, "--material", "r.nml", "--cells", "32", "--patches", "1", "--quiet",
+             "--speeds", "1", "-o", "c.csv"]
+    assert main(words) == 0
+    before = (tmp_path / "c.csv").read_text()
+
+    def full(self, path):
+        path.write_text("half of")
+        raise OSError(errno.ENOSPC, "No space left on device", str(path))
+
+    monkeypatch.setattr("asperity.results.friction_curve.FrictionCurve.to_csv", full)
+    capsys.readouterr()
+    assert main(words) == 3
+    assert "asperity: c.csv: cannot be written: No space left on" in capsys.readouterr().err
+    assert (tmp_path / "c.csv").read_text() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.csv", "c_runs", "r.nml"]
 
 
 def test_lists_may_begin_with_a_minus(tmp_path, monkeypatch, capsys):

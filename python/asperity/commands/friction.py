@@ -137,8 +137,11 @@ def _add_runs(parser: argparse.ArgumentParser) -> None:
                         help="run all cases again instead of reusing complete results")
     parser.add_argument("--quiet", action="store_true", help="show no progress")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, action="append",
-                        help=".html, .csv, .nc or .png; may be repeated (default: friction.html and"
-                             " friction.csv)")
+                        help=".html, .csv, .nc (netCDF), or a picture .png, .pdf or .svg; may be"
+                             " repeated (default: friction.html and friction.csv)")
+    parser.add_argument("--overwrite", action="store_true",
+                        help="replace outputs that exist, unless they are a road or the rubber;"
+                             " without this option only the outputs of the same plan are replaced")
 
 
 def _friction(chosen: argparse.Namespace) -> int:
@@ -148,7 +151,9 @@ def _friction(chosen: argparse.Namespace) -> int:
         if output.suffix.lower() not in _KINDS:
             raise ValueError(f"--output {output}: must end in {', '.join(_KINDS)}")
         check_folder(output)
+        _check_input(output, [*chosen.roads, chosen.material])
     from ..curves import plan_curve, run_curve
+    from ..curves.outputs import check_outputs, plan_code, write_output
     from ..curves.running import SubmittedError
     from ..curves.sources import compound_of, road_of
     from ..runs.means import Means, share_of_processors
@@ -169,6 +174,8 @@ def _friction(chosen: argparse.Namespace) -> int:
     if chosen.plan:
         return 0
     folder = chosen.folder or outputs[0].with_name(f"{outputs[0].stem}_runs")
+    code = plan_code(plan, chosen.error, chosen.extend)
+    check_outputs(outputs, folder, code, chosen.overwrite)
     try:
         curve = run_curve(plan, folder, means, error=chosen.error, extend=chosen.extend,
                           quiet=chosen.quiet)
@@ -177,8 +184,17 @@ def _friction(chosen: argparse.Namespace) -> int:
         return 0
     print(curve.summary(plan.all_notes))
     for output in outputs:
-        print(f"wrote {_write(curve, output)}")
+        write_output(output, folder, code, lambda name: _write(curve, name))
+        print(f"wrote {output}")
     return 0 if np.isfinite(curve.values["friction"]).all() else 4
+
+
+def _check_input(output: Path, inputs: list[str | Path]) -> None:
+    """Refuse an output that is one of the inputs."""
+    for given in inputs:
+        path = Path(str(given).removeprefix("spectrum:"))
+        if output.exists() and path.exists() and output.samefile(path):
+            raise ValueError(f"--output {output}: is an input: name another file")
 
 
 def _write(curve: FrictionCurve, output: Path) -> Path:

@@ -161,15 +161,28 @@ def _self_affine(words: str) -> Spectrum:
         if not equals or name not in _SELF_AFFINE or not is_number(text.strip()):
             raise ValueError(f"self_affine: {part!r}: must be NAME=NUMBER, NAME one of"
                              f" {', '.join(_SELF_AFFINE)}")
+        if name in values:
+            raise ValueError(f"self_affine: {name} is given twice")
         values[name] = float(text)
     lacks = [name for name in ("hurst", "wavelength_long", "wavelength_short")
              if name not in values]
     if lacks:
         raise ValueError(f"self_affine: lacks {', '.join(lacks)}")
-    long = values["wavelength_long"]
-    return Spectrum(*self_affine_psd(
-        values["hurst"], long, values.get("wavelength_rolloff", long), values["wavelength_short"],
-        rms_height=values.get("rms_height"), rms_slope=values.get("rms_slope")), "self-affine road")
+    long, short = values["wavelength_long"], values["wavelength_short"]
+    rolloff = values.get("wavelength_rolloff", long)
+    if short > 0.0 and not short < long:
+        raise ValueError(f"self_affine: wavelength_long = {long:g}: must be > wavelength_short ="
+                         f" {short:g}")
+    if short > 0.0 and not short < rolloff <= long:
+        raise ValueError(f"self_affine: wavelength_rolloff = {rolloff:g}: must be from"
+                         f" wavelength_short = {short:g} to wavelength_long = {long:g}")
+    try:
+        wave, psd = self_affine_psd(values["hurst"], long, rolloff, short,
+                                    rms_height=values.get("rms_height"),
+                                    rms_slope=values.get("rms_slope"))
+    except ValueError as error:
+        raise ValueError(f"self_affine: {error}") from None
+    return Spectrum(wave, psd, "self-affine road")
 
 
 def compound_of(

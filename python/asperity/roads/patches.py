@@ -292,6 +292,7 @@ class MeasuredRoad:
             self.notes += notes
         fewest = min(min(one.height.shape) for one in maps)
         whole_maps = all(one.periodic and max(one.height.shape) <= cells for one in maps)
+        self.seed = seed
         self.join = choice("join", method or ("none" if whole_maps else "seam"), JOINS)
         self.cells = self._cells(fewest, cells)
         self._places = self._cut(seed)
