@@ -556,6 +556,37 @@ def test_a_bare_dataset_is_read_as_the_program_reads_it(tmp_path, capsys):
         load(tmp_path / "road.h5", unit="um", size=(46, 21))
 
 
+def test_a_dataset_surface_is_read_as_the_program_reads_it(tmp_path):
+    """Its shape is (ny, nx). It used to be read with x first, so that the road was transposed."""
+    height = 1e-6 * sample()
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["another"] = height  # which comes first in the alphabet
+        file["surface"] = height
+    ny, nx = height.shape
+    found = load(tmp_path / "road.h5", level="none", unit="m", size=(46e-6, 21e-6))
+    run = asperity.run(
+        f"&grid nx = {nx}, ny = {ny}, lx = 46e-6, ly = 21e-6 /\n"
+        f"&surface shape = 'file', file = '{tmp_path / 'road.h5'}' /\n"
+        "&material shear_modulus = 1e6 /\n&phase pressure = 1. /\n", output=tmp_path / "run.h5")
+    np.testing.assert_array_equal(found.height, run.height)
+    assert (found.lx, found.ly) == (46e-6, 21e-6)
+    with pytest.raises(ValueError, match="names no unit of length"):
+        load(tmp_path / "road.h5", size=(46e-6, 21e-6))
+    with pytest.raises(ValueError, match=r"'surface' of .* has y first already"):
+        load(tmp_path / "road.h5", unit="m", size=(46e-6, 21e-6), transpose=True)
+
+
+def test_one_of_several_datasets_has_to_be_named(tmp_path):
+    """Datasets of other names have x first, as in SurfaceTopography."""
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file["error"] = np.zeros((4, 3))
+        file["height"] = sample().T
+    with pytest.raises(ValueError, match=r"holds several datasets: say which .*'error'.*'height'"):
+        load(tmp_path / "map.h5", unit="um", size=(LX, LY))
+    found = load(tmp_path / "map.h5", unit="um", size=(LX, LY), channel="height", level="none")
+    np.testing.assert_allclose(found.height, 1e-6 * sample(), rtol=1e-14)
+
+
 def test_the_message_on_a_damaged_file_names_it(tmp_path):
     with h5py.File(tmp_path / "road.h5", "w") as file:
         file["surface/height"] = np.zeros((200, 200))

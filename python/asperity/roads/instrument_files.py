@@ -25,6 +25,8 @@ UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "pm": 1e-12, "A": 1e-10, 
          "inch": 0.0254}
 _MICRO = {"\u00b5m": "um", "\u03bcm": "um", "\u00c5": "A", "\u212b": "A", "in": "inch"}
 _PARTS = {"mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12, "A": 1e10}  # exact, unlike 1e-6
+_HDF5 = "h5"            # format of HDF5 files of others, as SurfaceTopography calls it
+_SURFACE = "surface"    # dataset that `&surface file` reads by default, beside surface/height
 _NEEDS = "pip install SurfaceTopography"
 
 
@@ -160,6 +162,8 @@ def _choose(reader: Any, path: Path, wanted: str | int | None) -> Any:
     """Return the channel that was asked for."""
     known = list(reader.channels)
     listed = "; ".join(_channel_line(channel) for channel in known)
+    if wanted is None and reader.format() == _HDF5:
+        return _choose_dataset(path, known, listed)
     if wanted is None:
         first = reader.default_channel
         if not first.is_height_channel:
@@ -179,6 +183,15 @@ def _choose(reader: Any, path: Path, wanted: str | int | None) -> Any:
         raise ValueError(f"channel = {wanted!r}: {path} has {listed}")
     if not found[0].is_height_channel:
         raise ValueError(f"channel = {wanted!r}: holds no heights: {_channel_line(found[0])}")
+    return found[0]
+
+
+def _choose_dataset(path: Path, known: list[Any], listed: str) -> Any:
+    """Return the dataset of an HDF5 file of others: `surface`, as the program, or the only one."""
+    found = [channel for channel in known if channel.name == _SURFACE] or known
+    if len(found) > 1:
+        raise ValueError(f"{path}: holds several datasets: say which (channel, --channel):"
+                         f" {listed}")
     return found[0]
 
 
@@ -220,9 +233,17 @@ def read_map(
         if named is not None and given is not None and named != given:
             raise ValueError(f"unit = {given!r}: {path} has its own unit, {named!r}; `scale` scales"
                              " the heights")
+        # The program reads the dataset `surface` with the shape (ny, nx), so that it has no other
+        # meaning here. SurfaceTopography reads all datasets with x first.
+        rows_first = reader.format() == _HDF5 and chosen.name == _SURFACE
+        if transpose and rows_first:
+            raise ValueError(f"transpose: the dataset {_SURFACE!r} of {path} has y first already,"
+                             " as `&surface file` reads it: leave transpose (--transpose) out; if"
+                             " its first index runs along x, store it under another name")
+        y_first = transpose or rows_first
         arguments: dict[str, Any] = {}
         if chosen.physical_sizes is None:
-            arguments["physical_sizes"] = _size_of(path, chosen.dim, size, transpose)
+            arguments["physical_sizes"] = _size_of(path, chosen.dim, size, y_first)
         elif size is not None:
             known = " x ".join(f"{float(length):g}" for length in chosen.physical_sizes)
             raise ValueError(f"size: {path} has its own, {known} {named or ''}".rstrip())
@@ -245,7 +266,7 @@ def read_map(
     if array.ndim == 1:
         return (array[None, :], [lengths[0], lengths[0] / array.size], periodic,
                 named or str(given), source)
-    if transpose:
+    if y_first:
         lengths.reverse()
     else:
         array = array.T
