@@ -176,6 +176,63 @@ def test_temperatures_that_scatter_belong_together(tmp_path):
         fit_dma(table)
 
 
+def drifting(tmp_path, temperatures, drift):
+    """Return a table whose temperature drifts in each sweep, over the part of it that is done."""
+    done = np.linspace(0.0, 1.0, len(FREQUENCIES))
+    rows = [(f, *sweeps((t + one,), np.array([f]))[0][1:]) for t in temperatures
+            for f, one in zip(FREQUENCIES, drift(done), strict=True)]
+    return read_dma(write(tmp_path / "dma.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)", rows))
+
+
+@pytest.mark.parametrize(("temperatures", "drift"), [
+    ((0.0, 20.0, 40.0), lambda done: -0.2 + 0.5 * done),
+    ((0.0, 20.0, 40.0), lambda done: np.where(done < 0.5, -0.3, 0.3)),   # a jump above 0.5 K
+    ((0.0, 20.0, 40.0), lambda done: np.where(done > 0.9, 0.7, 0.0)),    # the last ones only
+    ((16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0), lambda done: -0.2 + 0.5 * done),
+    ((20.0,), lambda done: np.where(done < 0.5, -0.2, 0.35)),
+])
+def test_a_temperature_may_drift_within_a_sweep(tmp_path, temperatures, drift):
+    table = drifting(tmp_path, temperatures, drift)
+    mean = float(np.mean(drift(np.linspace(0.0, 1.0, len(FREQUENCIES)))))
+    fit = fit_dma(table)
+    assert [t for t, _ in fit.shifts] == pytest.approx([t + mean for t in temperatures], abs=1e-5)
+    assert [note for note in fit.notes if "the temperature drifts within the sweep" in note
+            and note.endswith("the mean of each sweep is used")]
+    assert not any("doubtful" in note for note in fit.notes)
+    for t, shift in fit.shifts:
+        expected = SHIFT.shift_factor(t) / SHIFT.shift_factor(fit.reference)
+        # A drift of 0.6 K changes log10 a_T by up to 0.09 within a sweep.
+        assert shift == pytest.approx(np.log10(float(expected)), abs=0.09)
+
+
+def test_a_large_drift_has_to_be_accepted(tmp_path):
+    table = drifting(tmp_path, (0.0, 20.0, 40.0), lambda done: 3.0 * done)
+    with pytest.raises(ValueError, match=r"drifts from 0 to 3 C .* = 0.75 \(--temp.* accepts"):
+        fit_dma(table)
+    assert len(fit_dma(table, temperature_tolerance=0.75).shifts) == 3
+
+
+@pytest.mark.parametrize("rise", [0.4, 1.0])
+def test_a_ramp_is_no_sweep(tmp_path, rise):
+    """A few frequencies in turn while the temperature rises: WLF constants can shift each point."""
+    rows = []
+    for k in range(60):
+        f = (1.0, 5.0, 25.0)[k % 3]
+        rows.append((f, *sweeps((10.0 + rise * k,), np.array([f]))[0][1:]))
+    table = read_dma(write(tmp_path / "ramp.csv", "f (Hz),G' (MPa),G'' (MPa),T (C)", rows))
+    if rise < 0.5:
+        with pytest.raises(ValueError, match=r"cannot be told from its drift \(a ramp\?\)"):
+            fit_dma(table)
+    else:
+        with pytest.raises(ValueError, match="1 frequency at"):
+            fit_dma(table)
+    fit = fit_dma(table, wlf=SHIFT)
+    assert fit.error_storage < 0.02
+    omega = np.logspace(1, 2, 5)
+    exact = RUBBER.complex_modulus(omega)
+    np.testing.assert_allclose(fit.material.complex_modulus(omega).real, exact.real, rtol=0.03)
+
+
 def test_temperatures_that_cannot_be_brought_together(tmp_path):
     table = table_of(tmp_path)
     with pytest.raises(ValueError, match="reference = 25: must be one of the temperatures -20"):

@@ -664,6 +664,7 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--temperatures", "-99"], "temperature = -99: a_T = inf by"),
     ([ROAD, "--material", "r.nml", "--seed", "-3"], "seed = -3: must be an integer >= 0"),
     ([ROAD, "--material", "r.nml", "--wlf", "8", "120"], "wlf: is for DMA tables only"),
+    ([ROAD, "--material", "r.nml", "--temperature-tolerance", "1"], "is for DMA tables only"),
     ([ROAD, "--material", "r.nml", "--column", "storage=2"], "--column): is for DMA tables"),
     ([ROAD, "--material", "r.nml", "--unit", "um"], "unit: only for roads that are files"),
     ([ROAD, "--material", "r.nml", "--size", "1", "2"], "size: only for roads that are files"),

@@ -106,7 +106,8 @@ def add_fit(verbs: Any) -> None:
                         help="temperature of the simulation, C (default: the reference)")
     parser.add_argument("--temperature-tolerance", type=float, default=0.5, metavar="K",
                         help="points whose temperatures differ by less than this belong to one"
-                             " sweep (default: 0.5)")
+                             " sweep, within which the temperature may drift by four times as much"
+                             " (default: 0.5)")
     parser.add_argument("--vertical", action="store_true",
                         help="if shifts are found from the overlap, also shift the moduli")
     parser.add_argument("--shifts", metavar="FILE.csv", type=Path,

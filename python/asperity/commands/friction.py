@@ -121,6 +121,8 @@ def _add_rubber(parser: argparse.ArgumentParser) -> None:
                         help="reference temperature of a DMA table, C")
     parser.add_argument("--vertical", action="store_true",
                         help="also shift the moduli of a DMA table")
+    parser.add_argument("--temperature-tolerance", type=float, metavar="K",
+                        help="tolerance of the temperatures of a DMA table, see `fit`")
 
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
@@ -164,7 +166,8 @@ def _friction(chosen: argparse.Namespace) -> int:
                    short=chosen.short, outliers=chosen.outliers, draw=chosen.draw,
                    seed=chosen.seed, **options)
     compound = compound_of(chosen.material, wlf=chosen.wlf, reference=chosen.reference,
-                           vertical=chosen.vertical, columns=columns_of(chosen))
+                           vertical=chosen.vertical, columns=columns_of(chosen),
+                           temperature_tolerance=chosen.temperature_tolerance)
     plan = plan_curve(road, compound, speeds=chosen.speeds, pressures=chosen.pressures,
                       temperatures=chosen.temperatures, patches=chosen.patches,
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,

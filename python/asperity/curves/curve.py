@@ -50,6 +50,7 @@ def friction_curve(
     wlf: Sequence[float] | None = None,
     reference: float | None = None,
     vertical: bool = False,
+    temperature_tolerance: float | None = None,
     tolerance: float = 1e-5,
     error: float | None = None,
     seed: int = 1,
@@ -102,7 +103,7 @@ def friction_curve(
     extend : float, optional
         Shortest wavelength (m) to which the spectrum of the road is extrapolated.
         ``friction_left_out`` is the friction that the omitted waves would add.
-    wlf, reference, vertical
+    wlf, reference, vertical, temperature_tolerance
         Options of the fit of a DMA table, see `asperity.dma.fit_dma`.
     tolerance : float
         Tolerance of the solver.
@@ -140,7 +141,8 @@ def friction_curve(
     sources = list(roads) if isinstance(roads, list | tuple) else [roads]
     road = road_of(sources, cells=cells, side=side, join=join, short=short, outliers=outliers,
                    draw=draw, seed=seed, **options)
-    compound = compound_of(material, wlf=wlf, reference=reference, vertical=vertical)
+    compound = compound_of(material, wlf=wlf, reference=reference, vertical=vertical,
+                           temperature_tolerance=temperature_tolerance)
     plan = plan_curve(road, compound, speeds=speeds, pressures=pressures,
                       temperatures=temperatures, patches=patches, coefficient=coefficient,
                       slope_effect=slope_effect, angle=angle, tolerance=tolerance)

@@ -192,6 +192,7 @@ def compound_of(
     reference: float | None = None,
     vertical: bool = False,
     arms_per_decade: float = 1.0,
+    temperature_tolerance: float | None = None,
     columns: Mapping[str, str | int] | None = None,
 ) -> Compound:
     """Return the rubber of a namelist with ``&material``, of a DMA table, or of a Prony series.
@@ -201,7 +202,7 @@ def compound_of(
     source : str, Path, Prony or Compound
         A file whose first word is a group, such as ``&material``, is a namelist. Any other file is
         a table for `asperity.dma.read_dma`.
-    wlf, reference, vertical, arms_per_decade
+    wlf, reference, vertical, arms_per_decade, temperature_tolerance
         As in `asperity.dma.fit_dma`, for tables.
     columns : mapping, optional
         Columns of a table by role, as in `asperity.dma.read_dma`.
@@ -226,13 +227,17 @@ def compound_of(
     words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")
     if words.startswith(("&", "$")):
         for name, value in (("wlf", wlf), ("reference", reference), ("vertical", vertical or None),
+                            ("temperature_tolerance (--temperature-tolerance)",
+                             temperature_tolerance),
                             ("columns (--column)", columns or None)):
             if value is not None:
                 raise ValueError(f"{name}: is for DMA tables only: {path} is a namelist, which has"
                                  " its own wlf_c1, wlf_c2 and reference_temperature")
         return _of_namelist(path)
     fit = fit_dma(read_dma(path, columns=columns), wlf=wlf, reference=reference, vertical=vertical,
-                  arms_per_decade=arms_per_decade)
+                  arms_per_decade=arms_per_decade, **(
+                      {} if temperature_tolerance is None
+                      else {"temperature_tolerance": temperature_tolerance}))
     return Compound(fit.material, fit.reference, fit.wlf, dict(fit.shifts),
                     dict(fit.vertical_shifts), fit.valid_range, fit.name, list(fit.notes))
 

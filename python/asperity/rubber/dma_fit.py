@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..base.check import number, positive
 from ..base.names import counted
 from ..base.presenters import present
+from .dma_sweeps import Sweep, drift_note, sweeps_of
 from .dma_table import DmaTable
 from .master_curve import MasterCurve, master_curve
 from .prony import Prony
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["DmaFit", "fit_dma"]
 
 FloatArray = NDArray[np.float64]
-Rows = tuple[float, NDArray[np.intp]]  # a temperature, C, and the points measured at it
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,9 @@ def fit_dma(
         Constants of the shift: dimensionless, K, C. `t_ref` is `reference` by default. Without
         them, several temperatures are shifted by `asperity.material.master_curve`.
     temperature_tolerance : float
-        Points whose temperatures differ by less than this (K) belong to one sweep.
+        Points whose temperatures differ by less than this (K) belong to one sweep. Within a sweep
+        the temperature may drift by four times as much; the mean is used. A larger difference
+        separates two sweeps, unless the frequencies continue from one to the other.
     least_plateau : float
         Lower bound of the plateau g_inf as a fraction of the lowest storage modulus, 0 to 1. It
         keeps the plateau positive if the data do not reach it.
@@ -237,11 +239,18 @@ def fit_dma(
     number("least_plateau", least_plateau, 0.0, 1.0)
     positive("temperature_tolerance", temperature_tolerance)
     notes = list(table.notes)
-    sweeps: list[Rows] = []
+    sweeps: list[Sweep] = []
+    constants = wlf_constants(wlf, reference)
     if table.temperature is not None:
-        sweeps = _sweeps(table.temperature, temperature_tolerance)
-    found = _shifted(table, sweeps, wlf_constants(wlf, reference), reference, temperature_tolerance,
-                     vertical)
+        try:
+            sweeps = sweeps_of(table.temperature, table.omega, temperature_tolerance)
+        except ValueError:
+            if constants is None:
+                raise
+            notes.append("the temperatures form no sweeps of the frequency: the constants shift"
+                         " each point from its own temperature")
+        notes += drift_note(table.temperature, sweeps)
+    found = _shifted(table, sweeps, constants, reference, temperature_tolerance, vertical)
     notes += found.notes
     reduced = table.omega * 10.0**found.log_shift
     order = np.argsort(reduced, kind="stable")
@@ -287,11 +296,13 @@ class _Shifted(NamedTuple):
     notes: list[str]
 
 
-def _shifted(table: DmaTable, sweeps: list[Rows], constants: WLF | None, reference: float | None,
+def _shifted(table: DmaTable, sweeps: list[Sweep], constants: WLF | None, reference: float | None,
              tolerance: float, vertical: bool) -> _Shifted:
     """Return the shifts, by the given constants or from the overlap of the sweeps."""
     shift, level = np.zeros(table.omega.size), np.zeros(table.omega.size)
     if constants is not None:
+        if table.temperature is not None and not sweeps:
+            shift[:] = np.log10(constants.shift_factor(table.temperature))
         for t, rows in sweeps:
             shift[rows] = math.log10(float(constants.shift_factor(t)))
         return _Shifted(shift, level, constants.t_ref, constants, None, [])
@@ -306,7 +317,7 @@ def _shifted(table: DmaTable, sweeps: list[Rows], constants: WLF | None, referen
     return _Shifted(shift, level, reference, None, None, [])
 
 
-def _overlaid(table: DmaTable, sweeps: list[Rows], reference: float | None, tolerance: float,
+def _overlaid(table: DmaTable, sweeps: list[Sweep], reference: float | None, tolerance: float,
               vertical: bool) -> _Shifted:
     """Return the shifts that make each sweep overlap its neighbour."""
     temperatures = [t for t, _ in sweeps]
@@ -390,25 +401,7 @@ def wlf_constants(wlf: Sequence[float] | None, reference: float | None) -> WLF |
     return WLF(c1 * c2 / moved, moved, reference)
 
 
-def _sweeps(temperature: FloatArray, tolerance: float) -> list[Rows]:
-    """Return the temperatures, ascending, each with its rows of the table."""
-    order = np.argsort(temperature, kind="stable")
-    cuts = np.flatnonzero(np.diff(temperature[order]) > tolerance) + 1
-    sweeps = []
-    for rows in np.split(order, cuts):
-        values = temperature[rows]
-        if np.ptp(values) > 4.0 * tolerance:
-            raise ValueError(
-                f"temperatures from {values.min():g} to {values.max():g} C lie closer than"
-                f" {tolerance:g} K to their neighbours: a ramp? Sweeps of the frequency at"
-                " temperatures further apart are needed, or a smaller temperature_tolerance"
-                " (--temperature-tolerance)")
-        mean = float(values[0]) if np.ptp(values) == 0.0 else round(float(np.mean(values)), 6)
-        sweeps.append((mean, rows))
-    return sweeps
-
-
-def _enough(table: DmaTable, sweeps: list[Rows]) -> None:
+def _enough(table: DmaTable, sweeps: list[Sweep]) -> None:
     """Raise ValueError if a sweep has too few frequencies to be shifted."""
     for t, rows in sweeps:
         if np.unique(table.omega[rows]).size < 3:
@@ -419,7 +412,7 @@ def _enough(table: DmaTable, sweeps: list[Rows]) -> None:
 
 
 def _doubts(
-    table: DmaTable, sweeps: list[Rows], curve: MasterCurve
+    table: DmaTable, sweeps: list[Sweep], curve: MasterCurve
 ) -> list[str]:
     """Return notes about sweeps that hardly overlap or do not lie on one curve."""
     doubts = []
