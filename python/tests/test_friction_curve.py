@@ -27,6 +27,7 @@ from asperity.curves.running import SubmittedError
 from asperity.curves.sources import compound_of, road_of
 from asperity.material import WLF, Prony
 from asperity.results.friction_curve import COLUMNS, interval
+from asperity.roads.outliers import find_outliers
 from asperity.rubber.compound import Compound
 from asperity.runs.means import Means
 
@@ -225,6 +226,18 @@ def test_warnings_of_runs_reach_the_curve(tmp_path, capsys):
             quiet=True, folder=tmp_path / "runs", jobs=1)
     assert found["warned"].values[:, 0].tolist() == [[[1, 1], [1, 1]], [[0, 0], [0, 0]]]
     assert found["converged"].all() and "patches of contact" in found.attrs["warnings"]
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_extreme_points_are_at_rest_or_glassy(tmp_path):
+    """At the ends of the allowed speeds nothing is lost, and the area is that of either modulus."""
+    plan = small_plan(speeds=[1e-30, 1e-12, 1e12, 1e30], patches=1)
+    curve = curve_of(plan, tmp_path)
+    area, friction = (curve.values[name][0, 0, :, 0] for name in ("contact_area", "friction"))
+    assert np.abs(friction).max() < 1e-6
+    np.testing.assert_allclose(area[::2], area[1::2], rtol=1e-3)
+    assert area[0] > 2.0 * area[3] > 0.0
+    assert np.isfinite(list(curve.theory.values())).all()
 
 
 # ---- ways of running -------------------------------------------------------------------------
@@ -660,6 +673,10 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "-o", "curve.txt"], "must end in .html"),
     ([ROAD, "--material", "r.nml", "--jobs", "0"], "jobs = 0"),
     ([ROAD, "--material", "r.nml", "--pressures", "-1e5"], "pressures[0] = -100000.0"),
+    ([ROAD, "--material", "r.nml", "--speeds", "1,1e200"],
+     "speeds: 1e+200 m/s: must be from 1e-30 to 1e+30 m/s"),
+    ([ROAD, "--material", "r.nml", "--speeds", "1e-200"], "speeds: 1e-200 m/s: must be from"),
+    ([ROAD, "--material", "r.nml", "--pressures", "1e200"], "pressures: 1e+200 Pa: must be from"),
     ([ROAD, "--material", "r.nml", "--speeds", "-1,2"], "speeds[0] = -1.0"),
     ([ROAD, "--material", "r.nml", "--temperatures", "-99"], "temperature = -99: a_T = inf by"),
     ([ROAD, "--material", "r.nml", "--seed", "-3"], "seed = -3: must be an integer >= 0"),
@@ -668,7 +685,8 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--column", "storage=2"], "--column): is for DMA tables"),
     ([ROAD, "--material", "r.nml", "--unit", "um"], "unit: only for roads that are files"),
     ([ROAD, "--material", "r.nml", "--size", "1", "2"], "size: only for roads that are files"),
-    ([ROAD, "--material", "r.nml", "--outliers", "remove"], "outliers: is for measured maps"),
+    ([ROAD, "--material", "r.nml", "--outliers", "remove"],
+     "outliers: is for measured maps and profiles only"),
     ([ROAD, "--material", "r.nml", "--side", "1e-2", "--short", "1e-4"],
      "short = 0.00025: must be at least two"),
     ([ROAD, ROAD, "--material", "r.nml"], "is given twice"),
@@ -880,6 +898,43 @@ def test_outliers_are_removed_from_maps_whose_spectrum_is_drawn(tmp_path):
     assert any("replaced by the median" in note for note in mended.notes)
     reported = road_of([tmp_path / "dust.h5"], draw=True, cells=32)
     assert any("1 of 9216 cells lie far off" in note for note in reported.notes), reported.notes
+
+
+def test_outliers_of_profiles(tmp_path, monkeypatch, capsys):
+    """They raise the spectrum at all waves; the ends of a slope are none."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    height = asperity.surface.self_affine(512, 1, lx=1e-3, wavelength_long=2e-4, hurst=0.8,
+                                          wavelength_short=1e-5, rms_slope=0.1, seed=3)
+    height = height + np.linspace(0.0, 1e-4, 512)
+    asperity.surface.save("good.h5", height, 1e-3, boundary="free")
+    for place, error in ((0, 2e-4), (100, 1e-4), (300, -1e-4), (301, -8e-5), (510, 2e-4),
+                         (511, 2e-4)):
+        height[0, place] += error
+    asperity.surface.save("dust.h5", height, 1e-3, boundary="free")
+    good, dust = road_of(["good.h5"], cells=32), road_of(["dust.h5"], cells=32)
+    mended = road_of(["dust.h5"], cells=32, outliers="remove")
+    assert not any("far off" in note for note in good.notes)
+    k = np.geomspace(2 * np.pi / 1e-4, 2 * np.pi / 3e-5, 20)
+    assert (dust.whole_spectrum.at(k) > 4.0 * good.whole_spectrum.at(k)).any()
+    np.testing.assert_allclose(mended.whole_spectrum.at(k), good.whole_spectrum.at(k), rtol=0.15)
+    assert main(["friction", "dust.h5", "--material", "r.nml", "--cells", "32", "--plan"]) == 0
+    assert "dust.h5: 6 of 512 points lie far off their neighbours" in capsys.readouterr().out
+    assert main(["friction", "dust.h5", "--material", "r.nml", "--cells", "32", "--plan",
+                 "--outliers", "remove"]) == 0
+    assert "usual: replaced by the median of the neighbours" in capsys.readouterr().out
+
+
+def test_smooth_profiles_have_no_outliers():
+    """No end of a slope, no summit and no edge of a wide groove counts as one."""
+    for cells in (2, 4, 8, 32):
+        rows = asperity.surface.self_affine(512, lx=1.0, wavelength_long=0.25, rms_slope=0.3,
+                                            wavelength_short=cells / 512, hurst=0.5, seed=1)
+        assert not any(find_outliers(row[None]).count for row in rows[::8])
+    random = np.random.default_rng(1)
+    assert not find_outliers(random.laplace(size=(1, 5000))).count
+    grooves = np.where(np.arange(2000) % 50 < 3, -1e-3, 0.0) + 1e-6 * random.standard_normal(2000)
+    assert not find_outliers(grooves[None]).count
 
 
 def test_missing_points_are_noted(tmp_path):

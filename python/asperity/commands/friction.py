@@ -100,8 +100,8 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--join", choices=("seam", "blend", "smooth", "mirror", "window"),
                         help="how patches are made periodic (default: seam)")
     parser.add_argument("--outliers", choices=("report", "remove"), default="report",
-                        help="what to do about single cells that differ strongly from their"
-                             " neighbours (default: report)")
+                        help="what to do about single cells, or points of a profile, that differ"
+                             " strongly from their neighbours (default: report)")
     parser.add_argument("--draw", action="store_true",
                         help="draw random maps from the combined spectrum instead of cutting"
                              " patches")

@@ -97,7 +97,8 @@ def friction_curve(
         How patches of measured maps are made periodic: 'seam', 'blend', 'smooth', 'mirror',
         'window'.
     outliers : {'report', 'remove'}
-        What to do about single cells that differ strongly from their neighbours.
+        What to do about single cells of maps, or points of profiles, that differ strongly from
+        their neighbours.
     draw : bool
         Draw random maps from the combined spectrum of the roads instead of cutting patches.
     extend : float, optional

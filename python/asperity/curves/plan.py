@@ -32,6 +32,7 @@ _TRANSFORMS = {True: (220.0, 0.08, 0.25), False: (50.0, 0.1, 0.4)}
 # NumPy; and the time to begin a run and to gather it, s; and to begin the command, s.
 _OTHER_WORK = 6.0
 _RUN, _COMMAND = 0.02, 1.5
+_RANGE = 1e-30, 1e30    # allowed speeds, m/s, and pressures, Pa
 _COMMAND_MEMORY = 130e6  # bytes, for the command itself
 
 
@@ -250,8 +251,8 @@ def plan_curve(
     ValueError
         If a value is not allowed.
     """
-    speed = np.sort(array_of("speeds", speeds, low=0.0, low_open=True, ndim=1))
-    pressure = np.sort(array_of("pressures", pressures, low=0.0, low_open=True, ndim=1))
+    speed = np.sort(_within("speeds", speeds, "m/s"))
+    pressure = np.sort(_within("pressures", pressures, "Pa"))
     usual = [compound.temperature] if temperatures is None else temperatures
     if not compound.series.g_inf > 0.0:
         raise ValueError(f"{compound.name}: shear_modulus = 0: steady sliding needs a long-term"
@@ -281,6 +282,16 @@ def plan_curve(
         notes.append("sliding along an axis of a periodic patch the rubber meets its own footprint"
                      " after one side; an oblique direction (angle, --angle) avoids it")
     return plan
+
+
+def _within(name: str, values: Sequence[float] | FloatArray, unit: str) -> FloatArray:
+    """Return positive values, whose squares and products are numbers, too."""
+    found = array_of(name, values, low=0.0, low_open=True, ndim=1)
+    low, high = _RANGE
+    for value in found:
+        if not low <= value <= high:
+            raise ValueError(f"{name}: {value:g} {unit}: must be from {low:g} to {high:g} {unit}")
+    return found
 
 
 def _longest(plan: CurvePlan) -> float:

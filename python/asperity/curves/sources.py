@@ -77,7 +77,7 @@ def road_of(
     seed = _seed(seed)
     maps: list[MeasuredSurface] = []
     spectra: list[Spectrum] = []
-    measured = False  # whether a spectrum is that of a map
+    measured = False  # whether a spectrum is that of a map or a profile
     if options and not any(map(_is_file_of_map, sources)):
         raise ValueError(f"{', '.join(options)}: only for roads that are files of maps or profiles")
     for source in sources:
@@ -89,7 +89,7 @@ def road_of(
             spectrum = spectrum_of_map(clean.height, clean.lx, clean.ly, periodic=clean.periodic,
                                        name=str(clean.source.get("name", "map")))
             spectra.append(replace(spectrum, notes=[*notes, *spectrum.notes]))
-            measured = measured or found.height.shape[0] > 1
+            measured = True
         else:
             maps.append(found)
     if maps and spectra:
@@ -102,7 +102,7 @@ def road_of(
     if join is not None:
         raise ValueError("join: is for patches of measured maps only")
     if outliers != "report" and not measured:
-        raise ValueError("outliers: is for measured maps only")
+        raise ValueError("outliers: is for measured maps and profiles only")
     return DrawnRoad(join_spectra(spectra), cells, side, short, seed)
 
 

@@ -1,4 +1,4 @@
-"""Outliers of a measured map: single cells that differ strongly from their neighbours."""
+"""Outliers of a map or a profile: single cells that differ strongly from their neighbours."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ __all__ = ["Outliers", "find_outliers"]
 FloatArray = NDArray[np.float64]
 
 _LIMIT = 12.0           # in units of the usual distance of a cell from its neighbours
+_END = 6                # cells of a profile from which it is continued beyond its ends
 _USUAL = 1.4826         # standard deviation over median deviation of a normal distribution
 
 
@@ -43,9 +44,10 @@ class Outliers:
 
     def summary(self) -> str:
         """Return a sentence about what was found."""
+        name = "cell" if self.cells.shape[0] > 1 else "point"
         if not self.count:
-            return "no cell lies far off its neighbours"
-        return (f"{self.count} of {self.cells.size} cells lie far off their neighbours, by up to"
+            return f"no {name} lies far off its neighbours"
+        return (f"{self.count} of {self.cells.size} {name}s lie far off their neighbours, by up to"
                 f" {self.largest:.3g} m where {self.usual:.3g} m is usual")
 
 
@@ -55,7 +57,7 @@ def find_outliers(height: FloatArray, limit: float = _LIMIT) -> Outliers:
     Parameters
     ----------
     height : ndarray, shape (ny, nx)
-        Heights, m.
+        Heights, m; ny = 1 for a profile.
     limit : float
         How far an outlier is above or below its neighbours, in units of the usual distance of a
         cell from their median, > 0. Up to two outliers may be next to each other.
@@ -97,14 +99,34 @@ def _neighbours(height: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     """
     from scipy.ndimage import rank_filter
 
+    if height.shape[0] == 1:
+        height = _continued(height)
     shape = (5 if height.shape[0] > 1 else 1, 5 if height.shape[1] > 1 else 1)
     footprint = np.ones(shape, dtype=bool)
     footprint[shape[0] // 2, shape[1] // 2] = False
     count = int(footprint.sum())
     third = 2 if count > 8 else 1
 
+    inside = slice(2, -2) if height.shape[0] == 1 else slice(None)
+
     def ranked(rank: int) -> FloatArray:
-        return rank_filter(height, rank, footprint=footprint, mode="reflect")
+        return rank_filter(height, rank, footprint=footprint, mode="reflect")[:, inside]
 
     return 0.5 * (ranked(count // 2 - 1) + ranked(count // 2)), ranked(third), ranked(
         count - 1 - third)
+
+
+def _continued(height: FloatArray) -> FloatArray:
+    """Return a profile with two more points at each end, on the line of its last points.
+
+    Reflected points would make the end of a slope an outlier. Medians give the line, so that an
+    outlier at the end does not affect it.
+    """
+    def beyond(line: FloatArray) -> FloatArray:
+        near = line[:_END]
+        slope = float(np.median(np.diff(near)))
+        level = float(np.median(near - slope * np.arange(near.size)))
+        return level - slope * np.arange(1.0, 3.0)
+
+    line = height[0]
+    return np.concatenate([beyond(line)[::-1], line, beyond(line[::-1])])[None, :]

@@ -150,7 +150,7 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
     Parameters
     ----------
     one : MeasuredSurface
-        A map or a profile. Outliers of profiles are neither found nor removed.
+        A map or a profile.
     outliers : str
         'report' or 'remove'.
 
@@ -166,8 +166,8 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
     choice("outliers", outliers, ("report", "remove"))
     name = one.source.get("name", "map")
     notes = [f"{name}: {step_in_words(step)}" for step in one.steps if step["step"] == "fill"]
-    found = find_outliers(one.height) if one.height.shape[0] > 1 else None
-    if found is None or not found.count:
+    found = find_outliers(one.height)
+    if not found.count:
         return one, notes
     if outliers == "report":
         return one, [*notes, f"{name}: {found.summary()}; `outliers = 'remove'` (--outliers"
