@@ -900,6 +900,39 @@ def test_outliers_are_removed_from_maps_whose_spectrum_is_drawn(tmp_path):
     assert any("1 of 9216 cells lie far off" in note for note in reported.notes), reported.notes
 
 
+def test_each_road_may_have_its_own_unit_and_size(tmp_path, monkeypatch, capsys):
+    """Two instruments measured one plate: one writes micrometres, the other one millimetres."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    height = asperity.surface.self_affine(96, lx=1e-3, wavelength_long=2e-4, wavelength_short=8e-5,
+                                          rms_slope=0.1, seed=3)
+    np.savetxt("a.txt", 1e6 * height)
+    np.savetxt("b.txt", 1e3 * height[:64])
+    asperity.surface.save("c.h5", height, 1e-3, boundary="free")
+    own = ["a.txt:unit=um,size=1000x1000", "b.txt:unit=mm,size=1x0.6666666667", "c.h5"]
+    first, second, third = road_of(own, cells=32)._maps
+    np.testing.assert_allclose(first.height, third.height, rtol=1e-9, atol=1e-18)
+    assert (first.lx, first.ly) == (1e-3, 1e-3)
+    assert second.lx == 1e-3 and second.height.std() == pytest.approx(
+        first.height[:64].std(), rel=0.2)
+    one, *_ = road_of(["a.txt:size=1000x1000", "b.txt:size=1x0.67,unit=mm"], cells=32,
+                      unit="um")._maps
+    assert one.lx == 1e-3
+
+    for words, message in (
+            (["a.txt", "b.txt"], "names no unit of length: give one .*; unit and size .* count"),
+            (["a.txt:size=1000x1000", "c.h5", "--unit", "um"],
+             "unit = 'um': c.h5 has its own unit, 'm'.* give a road its own, as ROAD:unit=um"),
+            (["a.txt:units=um"], "'units=um': must be NAME=VALUE, NAME one of unit, size, channel"),
+            (["a.txt:unit=um,size=1000"], "size: has 1 lengths, must have 2"),
+            (["a.txt:unit=um,size=axb"], "size = 'axb': must be two lengths, as 4000x3000"),
+            ([own[0], "a.txt:unit=um,size=10x10"], "a.txt:unit=um,size=10x10 is given twice")):
+        assert main(["friction", *words, "--material", "r.nml", "--cells", "32", "--plan"]) == 2
+        assert re.search(message, capsys.readouterr().err), message
+    assert main(["friction", *own, "--material", "r.nml", "--cells", "32", "-o", "a.txt"]) == 2
+    assert main(["friction", *own, "--material", "r.nml", "--cells", "32", "--plan"]) == 0
+
+
 def test_outliers_of_profiles(tmp_path, monkeypatch, capsys):
     """They raise the spectrum at all waves; the ends of a slope are none."""
     monkeypatch.chdir(tmp_path)

@@ -51,7 +51,9 @@ def add_friction(verbs: Any) -> None:
                     " with Persson's theory. The runs are in a folder next to the output. After an"
                     " interruption the same command resumes where it stopped.")
     parser.add_argument("roads", metavar="ROAD", nargs="+",
-                        help="a height map in any format that `import` reads; spectrum:FILE; or"
+                        help="a height map in any format that `import` reads, as FILE or with"
+                             " options for this file, FILE:unit=um,size=4000x3000,channel=NAME;"
+                             " spectrum:FILE; or"
                              " self_affine:NAME=VALUE,... with hurst, wavelength_long,"
                              " wavelength_short, and rms_slope or rms_height")
     parser.add_argument("--material", required=True, metavar="RUBBER", type=Path,
@@ -107,9 +109,10 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
                              " patches")
     parser.add_argument("--seed", type=int, default=1,
                         help="seed that selects the patches (default: 1)")
-    parser.add_argument("--unit", help="unit of length of maps that name none")
+    parser.add_argument("--unit",
+                        help="unit of length of maps that name none; counts for all roads")
     parser.add_argument("--size", nargs="+", type=float, metavar=("LX", "LY"),
-                        help="lengths of maps that give none, in their unit")
+                        help="lengths of maps that give none, in their unit; counts for all roads")
 
 
 def _add_rubber(parser: argparse.ArgumentParser) -> None:
@@ -153,13 +156,13 @@ def _friction(chosen: argparse.Namespace) -> int:
         if output.suffix.lower() not in _KINDS:
             raise ValueError(f"--output {output}: must end in {', '.join(_KINDS)}")
         check_folder(output)
-        _check_input(output, [*chosen.roads, chosen.material])
     from ..curves import plan_curve, run_curve
     from ..curves.outputs import check_outputs, plan_code, write_output
     from ..curves.running import SubmittedError
-    from ..curves.sources import compound_of, road_of
+    from ..curves.sources import compound_of, file_of_road, road_of
     from ..runs.means import Means, share_of_processors
 
+    _check_inputs(outputs, [*map(file_of_road, chosen.roads), chosen.material])
     options = {name: getattr(chosen, name) for name in ("unit", "size")
                if getattr(chosen, name) is not None}
     road = road_of(chosen.roads, cells=chosen.cells, side=chosen.side, join=chosen.join,
@@ -192,11 +195,11 @@ def _friction(chosen: argparse.Namespace) -> int:
     return 0 if np.isfinite(curve.values["friction"]).all() else 4
 
 
-def _check_input(output: Path, inputs: list[str | Path]) -> None:
+def _check_inputs(outputs: list[Path], inputs: list[Path | None]) -> None:
     """Refuse an output that is one of the inputs."""
-    for given in inputs:
-        path = Path(str(given).removeprefix("spectrum:"))
-        if output.exists() and path.exists() and output.samefile(path):
+    for output in outputs:
+        if output.exists() and any(path is not None and path.exists() and output.samefile(path)
+                                   for path in inputs):
             raise ValueError(f"--output {output}: is an input: name another file")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,10 +24,11 @@ from ..runs.case import Case
 from ..theory.rough import self_affine_psd
 from .spectrum_files import spectrum_of_file
 
-__all__ = ["compound_of", "road_of"]
+__all__ = ["compound_of", "file_of_road", "road_of"]
 
 Road = DrawnRoad | MeasuredRoad
 
+_OWN = ("unit", "size", "channel")  # options that may follow the name of a road
 _SELF_AFFINE = ("hurst", "wavelength_long", "wavelength_rolloff", "wavelength_short", "rms_height",
                 "rms_slope")
 
@@ -49,8 +51,9 @@ def road_of(
     ----------
     sources : sequence of str, Path, MeasuredSurface or Spectrum
         Each source is one of these. A measured map in any format that `asperity.surface.load`
-        reads: patches are cut from it. A profile: it stands for the isotropic road with such
-        profiles. ``"spectrum:FILE"``: a table of wave numbers (rad/m) and densities.
+        reads: patches are cut from it. Options of this file alone may follow its name, as in
+        ``"plate.csv:unit=um,size=4000x3000,channel=Height"``. A profile: it stands for the
+        isotropic road with such profiles. ``"spectrum:FILE"``: a table of wave numbers (rad/m) and densities.
         ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``.
         Spectra and profiles are combined into one spectrum.
     cells : int
@@ -62,7 +65,8 @@ def road_of(
     draw : bool
         Draw random maps from the combined spectrum of the maps, instead of cutting patches.
     **options
-        Options of `asperity.surface.load`.
+        Options of `asperity.surface.load`, which count for all files; the options of a single file
+        take precedence.
 
     Returns
     -------
@@ -80,8 +84,15 @@ def road_of(
     measured = False  # whether a spectrum is that of a map or a profile
     if options and not any(map(_is_file_of_map, sources)):
         raise ValueError(f"{', '.join(options)}: only for roads that are files of maps or profiles")
+    several = sum(map(_is_file_of_map, sources)) > 1
     for source in sources:
-        found = _road_source(source, options)
+        try:
+            found = _road_source(source, options)
+        except ValueError as error:
+            if several and re.search(r"^(unit|size)\b|names no unit|gives no lengths", str(error)):
+                raise ValueError(f"{error}; unit and size (--unit, --size) count for all roads:"
+                                 " give a road its own, as ROAD:unit=um,size=4000x3000") from None
+            raise
         if isinstance(found, Spectrum):
             spectra.append(found)
         elif found.height.shape[0] == 1 or draw:
@@ -114,8 +125,10 @@ def _check_twice(sources: Sequence[Any]) -> None:
             continue
         words = str(source)
         kind, colon, file = words.rpartition("spectrum:")
-        known = words if words.startswith("self_affine:") else kind + colon + str(
-            Path(file).resolve())
+        known = words
+        if not words.startswith("self_affine:"):
+            path, own = (file, {}) if colon else _own_options(words)
+            known = f"{kind}{colon}{Path(path).resolve()} {own.get('channel', '')}"
         if known in seen:
             raise ValueError(f"roads: {words} is given twice: its patches would count as"
                              " independent ones")
@@ -126,6 +139,49 @@ def _is_file_of_map(source: Any) -> bool:
     """Return whether a source is a file that `asperity.surface.load` reads."""
     return isinstance(source, str | Path) and not str(source).startswith(
         ("self_affine:", "spectrum:"))
+
+
+def file_of_road(source: str | Path) -> Path | None:
+    """Return the file that a source names, or None if it names none.
+
+    Examples
+    --------
+    >>> file_of_road("spectrum:psd.csv").name, file_of_road("plate.csv:unit=um").name
+    ('psd.csv', 'plate.csv')
+    """
+    words = str(source)
+    if words.startswith("self_affine:"):
+        return None
+    if words.startswith("spectrum:"):
+        return Path(words.partition(":")[2])
+    return Path(_own_options(words)[0])
+
+
+def _own_options(words: str) -> tuple[str, dict[str, Any]]:
+    """Return the name of a file, and the options that follow it.
+
+    Examples
+    --------
+    >>> _own_options("plate.csv:unit=um,size=4000x3000")
+    ('plate.csv', {'unit': 'um', 'size': [4000.0, 3000.0]})
+    """
+    file, colon, rest = words.rpartition(":")
+    if not colon or "=" not in rest or Path(words).exists():
+        return words, {}
+    options: dict[str, Any] = {}
+    for part in rest.split(","):
+        name, _, text = (one.strip() for one in part.partition("="))
+        if name not in _OWN or not text or name in options:
+            raise ValueError(f"{words}: {part!r}: must be NAME=VALUE, NAME one of"
+                             f" {', '.join(_OWN)}, each once")
+        options[name] = text
+    if "size" in options:
+        lengths = re.split("[x×]", options["size"])
+        if len(lengths) > 2 or not all(map(is_number, lengths)):
+            raise ValueError(f"{words}: size = {options['size']!r}: must be two lengths, as"
+                             " 4000x3000, or one for a profile")
+        options["size"] = [float(length) for length in lengths]
+    return file, options
 
 
 def _seed(value: Any) -> int:
@@ -149,7 +205,8 @@ def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[
         raise ValueError(f"roads: a {type(source).__name__}: must be the name of a file, words such"
                          " as 'self_affine:...', a MeasuredSurface or a Spectrum; an array becomes"
                          " a file with asperity.surface.save")
-    return load(words, **{"level": "tilt", **options})
+    file, own = _own_options(words)
+    return load(file, **{"level": "tilt", **options, **own})
 
 
 def _self_affine(words: str) -> Spectrum:
