@@ -8,11 +8,6 @@ import re
 import signal
 import sys
 
-from .base.library import version
-from .commands.data import add_fit, add_import
-from .commands.friction import add_friction
-from .commands.results import add_plot, add_report, add_watch
-
 __all__ = ["main"]
 
 
@@ -30,19 +25,8 @@ def main(arguments: list[str] | None = None) -> int:
         0 done; 2 wrong arguments; 3 a file cannot be read or written; 4 a computation failed, or
         needs more memory than there is; 130 stopped by Ctrl-C.
     """
-    parser = argparse.ArgumentParser(
-        prog=os.environ.get("ASPERITY_COMMAND", "python -m asperity"),
-        description="Turns measured roads and rubbers into inputs, computes friction curves, and"
-                    " turns results into pictures and pages. The command `asperity run` computes"
-                    " a case.")
-    parser.add_argument("--version", action="version", version=f"asperity {version()}")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
-    for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):
-        add(verbs)
-    chosen = parser.parse_args(with_negative_lists(sys.argv[1:] if arguments is None
-                                                   else arguments))
     try:
-        return chosen.call(chosen)
+        return _run(sys.argv[1:] if arguments is None else arguments)
     except (OSError, ImportError) as error:
         return _fail(error, 3)
     except (KeyError, IndexError, ValueError) as error:
@@ -54,6 +38,26 @@ def main(arguments: list[str] | None = None) -> int:
                                  "not enough memory"), 4)
     except KeyboardInterrupt:
         return _fail(KeyboardInterrupt("stopped by Ctrl-C"), 128 + signal.SIGINT)
+
+
+def _run(arguments: list[str]) -> int:
+    """Run the command. Modules are imported here, because Ctrl-C may come while NumPy is loaded."""
+    from .base.library import version
+    from .commands.data import add_fit, add_import
+    from .commands.friction import add_friction
+    from .commands.results import add_plot, add_report, add_watch
+
+    parser = argparse.ArgumentParser(
+        prog=os.environ.get("ASPERITY_COMMAND", "python -m asperity"),
+        description="Turns measured roads and rubbers into inputs, computes friction curves, and"
+                    " turns results into pictures and pages. The command `asperity run` computes"
+                    " a case.")
+    parser.add_argument("--version", action="version", version=f"asperity {version()}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):
+        add(verbs)
+    chosen = parser.parse_args(with_negative_lists(arguments))
+    return chosen.call(chosen)
 
 
 def with_negative_lists(arguments: list[str]) -> list[str]:

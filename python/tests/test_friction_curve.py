@@ -6,6 +6,7 @@ import importlib.util
 import json
 import os
 import re
+import resource
 import signal
 import stat
 import subprocess
@@ -355,6 +356,34 @@ def test_ctrl_c_ends_without_a_traceback(tmp_path):
     assert "asperity: stopped by Ctrl-C" in said and "Traceback" not in said
 
 
+def test_ctrl_c_while_modules_are_loaded(monkeypatch, capsys):
+    class Interrupted:
+        @staticmethod
+        def find_spec(name, path=None, target=None):
+            if name == "asperity.commands.friction":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "asperity.commands.friction", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Interrupted, *sys.meta_path])
+    assert main(["friction", "--help"]) == 130
+    assert "asperity: stopped by Ctrl-C" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("size", [20_000, 60_000])
+def test_files_that_are_too_large_end_with_status_3(tmp_path, size):
+    """The first limit stops the map of a patch, which takes 35 kB, the second one a result."""
+    (tmp_path / "rubber.nml").write_text(NAMELIST)
+    done = subprocess.run(
+        [sys.executable, "-m", "asperity", "friction", ROAD, "--material", "rubber.nml",
+         "--speeds", "1e-3:1:6", "--cells", "64", "--patches", "1", "--quiet", "-o", "c.csv"],
+        cwd=tmp_path, capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
+    assert done.returncode == 3, done.stderr
+    assert re.search(r"\.h5: cannot be written: .*(too large|cannot grow)", done.stderr)
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.glob("**/*.new*"))
+
+
 SBATCH = """#!/bin/sh
 # A stand-in for Slurm: notes the call, and runs the tasks of an array one after the other.
 echo "$@" >> "{folder}/calls"
@@ -673,6 +702,8 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "-o", "curve.txt"], "must end in .html"),
     ([ROAD, "--material", "r.nml", "--jobs", "0"], "jobs = 0"),
     ([ROAD, "--material", "r.nml", "--pressures", "-1e5"], "pressures[0] = -100000.0"),
+    ([ROAD, "--material", "r.nml", "--coefficient", "1e300"],
+     "coefficient = 1e+300: must be a finite number >= 0 and <= 100"),
     ([ROAD, "--material", "r.nml", "--speeds", "1,1e200"],
      "speeds: 1e+200 m/s: must be from 1e-30 to 1e+30 m/s"),
     ([ROAD, "--material", "r.nml", "--speeds", "1e-200"], "speeds: 1e-200 m/s: must be from"),

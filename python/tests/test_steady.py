@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -271,6 +272,30 @@ def test_random_rows_against_dense_matrices(program: str, laws: tuple[str, ...])
     counts = {tuple(line.split()[:3]): int(line.split()[3]) for line in done.stdout.splitlines()
               if len(line.split()) == 4}
     assert sum(n for (_, _, end), n in counts.items() if end == "right") >= 20
+
+
+@pytest.mark.parametrize(("law", "message"), [
+    ("law = 'coulomb', coefficient = 3., slope_effect = .false.",
+     "no solution was found; a larger max_iterations seldom helps, a lower coefficient or a"
+     " smoother road may"),
+    ("law = 'constant_shear', shear_strength = 5e5",
+     "no solution was found, although one exists: law = 'coulomb_orowan' with coefficient = 0.5"
+     " often has one"),
+])
+def test_the_advice_on_rows_without_a_solution(tmp_path, law, message):
+    """It says whether a larger limit of iterations helps, and names a coefficient."""
+    limit = ", max_iterations = 2" if "constant" in law else ""  # it is solved otherwise
+    case = f"""
+&grid nx = 32, ny = 32, lx = 1e-3 /
+&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 5e-4, wavelength_short = 2.5e-4,
+   rms_slope = 0.8, seed = 2 /
+&material shear_modulus = 1e6, prony_g = 1e7, prony_tau = 1e-3 /
+&friction {law} /
+&phase steady = .true., pressure = 1e5, velocity_x = 0.5 /
+&solver tolerance = 1e-5{limit} /
+"""
+    with pytest.raises(asperity.NotConverged, match=re.escape(message)):
+        asperity.run(case, output=tmp_path / "case.h5")
 
 
 def flat_topped(nx: int, ny: int) -> np.ndarray:

@@ -18,11 +18,15 @@ from ..runs.means import Means, run_jobs
 from ..runs.progress import Progress
 from .plan import CurvePlan
 
-__all__ = ["CurveError", "Piece", "SubmittedError", "run_pieces"]
+__all__ = ["CurveError", "CurveFileError", "Piece", "SubmittedError", "run_pieces"]
 
 
 class CurveError(RuntimeError):
     """Some runs of a curve failed; the finished ones are kept for the next call."""
+
+
+class CurveFileError(CurveError, OSError):
+    """Runs failed because files cannot be written or read, as on a full disk."""
 
 
 class SubmittedError(RuntimeError):
@@ -146,11 +150,12 @@ def _is_there(job: Job) -> bool:
 
 
 def _look_for_failures(pieces: list[Piece]) -> None:
-    """Raise CurveError with the messages of runs that have failed."""
+    """Raise CurveError or CurveFileError with the messages of runs that have failed."""
     failed = [piece.job for piece in pieces if piece.job.status not in (0, 4)]
     if failed:
         listed = "\n".join(f"  {job.name}: {job.message or 'was not run'}" for job in failed[:10])
-        raise CurveError(f"{len(failed)} of {len(pieces)} runs failed:\n{listed}")
+        kind = CurveFileError if all(job.status == 3 for job in failed) else CurveError
+        raise kind(f"{len(failed)} of {len(pieces)} runs failed:\n{listed}")
 
 
 def _broken_off(pieces: list[Piece], plan: CurvePlan) -> Iterator[tuple[Piece, int]]:

@@ -53,7 +53,8 @@ def road_of(
         Each source is one of these. A measured map in any format that `asperity.surface.load`
         reads: patches are cut from it. Options of this file alone may follow its name, as in
         ``"plate.csv:unit=um,size=4000x3000,channel=Height"``. A profile: it stands for the
-        isotropic road with such profiles. ``"spectrum:FILE"``: a table of wave numbers (rad/m) and densities.
+        isotropic road with such profiles. ``"spectrum:FILE"``: a table of wave numbers (rad/m) and
+        densities.
         ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``.
         Spectra and profiles are combined into one spectrum.
     cells : int

@@ -149,7 +149,7 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
 
 def _write(path: Path, held: HeldMap, title: str) -> Path:
     """Write the file; it gets its name only when it is complete."""
-    with new_map_file(path, title, "asperity") as file:
+    with new_map_file(path, title, "asperity", held.height.nbytes) as file:
         lengths = {}
         if held.lx is not None:
             ny, nx = held.height.shape

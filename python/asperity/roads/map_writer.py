@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 __all__ = ["new_map_file", "write_grid", "write_height"]
 
 
+_MORE = 20_000  # bytes that a file takes beside the heights
+
+
 def _is_result(path: Path) -> bool:
     """Return whether a file is the result of a run, which a map must not replace."""
     import h5py
@@ -30,7 +35,7 @@ def _is_result(path: Path) -> bool:
 
 
 @contextmanager
-def new_map_file(path: Path, title: str, program: str) -> Iterator[h5py.File]:
+def new_map_file(path: Path, title: str, program: str, size: int) -> Iterator[h5py.File]:
     """Open a new file, which gets its name when it is complete.
 
     Parameters
@@ -39,6 +44,9 @@ def new_map_file(path: Path, title: str, program: str) -> Iterator[h5py.File]:
         The file.
     title, program : str
         Attributes of the file.
+    size : int
+        Size of the heights, bytes. There must be room for them, because HDF5 may crash if there is
+        none when it closes a file.
 
     Yields
     ------
@@ -62,14 +70,20 @@ def new_map_file(path: Path, title: str, program: str) -> Iterator[h5py.File]:
         raise ValueError(f"{path}: is the result of a run: name another file")
     new = path.with_name(path.name + ".new")
     try:
+        with new.open("wb") as empty:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(empty.fileno(), 0, size + _MORE)
         with h5py.File(new, "w") as file:
             file.attrs.update(title=title, program=program, version=version(),
                               created=f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}")
             yield file
         new.replace(path)
-    except OSError as error:
+    except (OSError, RuntimeError) as error:  # h5py raises the latter where closing a file fails
+        reason = re.search("error message = '(.*?)'", str(error))
+        said = (reason and reason[1]) or (isinstance(error, OSError) and error.strerror) or error
+        raise OSError(f"{path}: cannot be written: {said}") from None
+    finally:
         new.unlink(missing_ok=True)
-        raise OSError(f"{path}: cannot be written: {error}") from None
 
 
 def write_height(file: h5py.File, height: NDArray[np.float64], **attributes: Any) -> None:

@@ -144,7 +144,8 @@ class MeasuredSurface:
         import h5py
 
         path = Path(path)
-        with new_map_file(path, self.source["name"], "asperity import") as file:
+        with new_map_file(path, self.source["name"], "asperity import",
+                          self.height.nbytes) as file:
             file.attrs.update({f"source_{name}": value for name, value in self.source.items()
                                if name != "metadata"})
             # The metadata are a dataset, because an attribute is limited to 64 kB.
