@@ -63,17 +63,21 @@ def _run(arguments: list[str]) -> int:
 def with_negative_lists(arguments: list[str]) -> list[str]:
     """Return the words of a command line, with lists that begin with a minus as values.
 
-    argparse takes ``-10`` as a value, but ``-10,20`` and ``-1e-3`` as unknown options.
+    argparse takes ``-10`` as a value, but ``-10,20`` and ``-1e-3`` as unknown options, and so a
+    single option of ``sbatch`` behind ``--slurm``.
 
     Examples
     --------
     >>> with_negative_lists(["--temperatures", "-10,20", "--angle", "-5"])
     ['--temperatures=-10,20', '--angle', '-5']
+    >>> with_negative_lists(["--slurm", "--time=1:00:00"])
+    ['--slurm=--time=1:00:00']
     """
     words: list[str] = []
     for word in arguments:
         if (words and words[-1].startswith("--") and "=" not in words[-1]
-                and re.match(r"-\.?\d.*[,:eE]", word)):
+                and (re.match(r"-\.?\d.*[,:eE]", word)
+                     or (words[-1] == "--slurm" and re.match(r"--?[A-Za-z]", word)))):
             words[-1] += f"={word}"
         else:
             words.append(word)

@@ -685,6 +685,8 @@ def test_rubber_of_several_kinds(tmp_path):
 
 @pytest.mark.parametrize("words, message", [
     (["self_affine:hurst=0.8", "--material", "r.nml"], "lacks wavelength_long"),
+    (["self_afine:hurst=0.8", "--material", "r.nml"], "did you mean self_affine:?"),
+    (["spectrum:", "--material", "r.nml"], "spectrum: names no file: must be spectrum:FILE"),
     (["self_affine:hurts=0.8", "--material", "r.nml"], "NAME one of hurst"),
     ([ROAD.replace("long=1e-3", "long=1e-4"), "--material", "r.nml"],
      "self_affine: wavelength_long = 0.0001: must be > wavelength_short = 0.00025"),

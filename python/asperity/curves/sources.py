@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -169,6 +170,10 @@ def _own_options(words: str) -> tuple[str, dict[str, Any]]:
     file, colon, rest = words.rpartition(":")
     if not colon or "=" not in rest or Path(words).exists():
         return words, {}
+    kind = words.partition(":")[0]
+    near = difflib.get_close_matches(kind, ["self_affine", "spectrum"], n=1)
+    if near and not Path(file).exists():
+        raise ValueError(f"{words}: {kind!r} is no kind of road: did you mean {near[0]}:?")
     options: dict[str, Any] = {}
     for part in rest.split(","):
         name, _, text = (one.strip() for one in part.partition("="))
@@ -201,6 +206,8 @@ def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[
     if words.startswith("self_affine:"):
         return _self_affine(words.partition(":")[2])
     if words.startswith("spectrum:"):
+        if words == "spectrum:":
+            raise ValueError("spectrum: names no file: must be spectrum:FILE")
         return spectrum_of_file(Path(words.partition(":")[2]))
     if not isinstance(source, str | Path):
         raise ValueError(f"roads: a {type(source).__name__}: must be the name of a file, words such"
