@@ -27,6 +27,7 @@ from asperity.curves import CurvePlan, plan_curve, run_curve
 from asperity.curves.running import SubmittedError
 from asperity.curves.sources import compound_of, road_of
 from asperity.material import WLF, Prony
+from asperity.results.curve_remarks import CurveRemark
 from asperity.results.friction_curve import COLUMNS, interval
 from asperity.roads.outliers import find_outliers
 from asperity.rubber.compound import Compound
@@ -537,6 +538,33 @@ def test_the_settings_on_the_page_have_units(curve, tmp_path):
     assert found["lx"] == f"{curve.settings['lx']} m"
     assert found["shortest wave"].endswith(" m") and found["angle"].endswith("°")
     assert found["extended to"].endswith(" m") == (curve.settings["extended_to"] != "no")
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
+def test_marks_on_the_page(curve, tmp_path):
+    """Rings are around points with warnings, crosses where no patch has a value."""
+    shape = curve.values["friction"].shape
+    warned, lost = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    warned[0, 0, 0, 1] = True
+    lost[1, 1, 2] = True
+    values = {name: np.where(lost, np.nan, array) for name, array in curve.values.items()}
+    remarks = [CurveRemark("the road wedges", lost, True), CurveRemark("few cells", warned)]
+    page = replace(curve, values=values, remarks=remarks).to_html(tmp_path / "curve.html")
+    with Browser(tmp_path) as browser:
+        browser.window(1200, 900)
+        browser.open(page)
+        counts = ("return ['circle', 'path'].map((kind) =>"
+                  " document.querySelectorAll(`#curves ${kind}.flag`).length)")
+        assert browser.run(counts) == [5, 5]  # one in each chart
+        texts, _ = browser.saved()
+        assert sum("warnings" in text.splitlines()[0] and "[2]" in text for text in texts) == 5
+        told = "return document.getElementById('point-warnings').textContent"
+        assert browser.run(told) == ""
+        browser.run("const place = document.getElementById('choose-speed'); place.value = '0';"
+                    " place.dispatchEvent(new Event('change'))")
+        assert browser.run(told) == "Warnings [2] concern this point."
+        browser.run("document.querySelector('#curves button').click()")
+        assert browser.console() == []
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
