@@ -168,7 +168,8 @@ class DmaFit:
             If the file cannot be written.
         """
         if len(self.shifts) < 2:
-            raise ValueError(f"{self.name}: has one temperature: there are no shifts to write")
+            raise ValueError(f"{self.name}: has no sweeps at several temperatures: there are no"
+                             " shifts to write")
         upward = dict(self.vertical_shifts)
         lines = ["temperature,log10_a_t,a_t,b_t"]
         lines += [f"{t!r},{shift!r},{10.0**shift!r},{10.0**upward.get(t, 0.0)!r}"
