@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import viscoelastic_case as vc
 from conftest import PATIENCE, ROOT
 from slurm import HAS_SLURM, Slurm
 
@@ -335,7 +336,7 @@ def test_a_row_is_given_up_together_though_clocks_differ(
     case = write(tmp_path, STUCK)
     monkeypatch.setenv("LD_PRELOAD", str(library))
     process, result = start(3, case, 2)
-    time.sleep(1.0)
+    vc.wait_for_work(process, number=children(process)[-1])
     process.send_signal(signal.SIGXCPU)
     _, message = process.communicate(timeout=PATIENCE)
     assert process.returncode == 128 + signal.SIGXCPU, message

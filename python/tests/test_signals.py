@@ -81,7 +81,7 @@ def test_stop_within_a_row(program: str, stuck: Path) -> None:
     for restart in ([], ["--restart"]):
         process = vc.start(program, stuck, *restart)
         vc.wait_for_rows(process, result, 3)
-        time.sleep(1.0)
+        vc.wait_for_work(process)
         process.terminate()
         start = time.monotonic()
         _, message = process.communicate(timeout=PATIENCE)
@@ -106,7 +106,7 @@ def test_stop_within_a_row_of_python(stuck: Path, number: signal.Signals) -> Non
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     vc.wait_for_rows(process, stuck.with_suffix(".h5"), 3)
-    time.sleep(1.0)
+    vc.wait_for_work(process)
     process.send_signal(number)
     printed, message = process.communicate(timeout=PATIENCE)
     if number == signal.SIGINT:
@@ -150,16 +150,6 @@ ENDLESS = """
 """
 
 
-def wait_for_work(process: subprocess.Popen, seconds: float = 1.0) -> None:
-    """Wait until a process has used some processor time, so that its work must have begun."""
-    clock = os.sysconf("SC_CLK_TCK")
-    while process.poll() is None:
-        words = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
-        if (int(words[11]) + int(words[12])) / clock > seconds:
-            return
-        time.sleep(0.05)
-
-
 @pytest.mark.parametrize("more, status, reason", [
     ((), 143, "stopped by SIGTERM before the first row"),
     (("--time-limit", "0:03"), 124, "the time limit is near: stopped before the first row")])
@@ -170,7 +160,7 @@ def test_stop_within_a_solve(program: str, tmp_path: Path, more: tuple[str, ...]
     case.write_text(ENDLESS)
     process = vc.start(program, case, *more)
     if not more:
-        wait_for_work(process)
+        vc.wait_for_work(process)
         process.terminate()
     start = time.monotonic()
     _, message = process.communicate(timeout=PATIENCE)
@@ -198,7 +188,7 @@ def test_interrupt_within_a_solve_of_python(tmp_path: Path, what: str) -> None:
               "print(contact.converged)\n")
     process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
-    wait_for_work(process, 4.0)
+    vc.wait_for_work(process, 4.0)
     process.send_signal(signal.SIGINT)
     printed, message = process.communicate(timeout=PATIENCE)
     assert (process.returncode, printed) == (0, "interrupted None 0.0\nTrue\n"), message

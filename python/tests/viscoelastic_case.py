@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import time
@@ -76,6 +77,25 @@ def wait_for_rows(process: subprocess.Popen, path: Path, wanted: int,
         finally:
             process.send_signal(signal.SIGCONT)
         time.sleep(0.002)
+
+
+def wait_for_work(process: subprocess.Popen, seconds: float = 1.0,
+                  number: int | None = None) -> None:
+    """Wait until a process has used so much more processor time.
+
+    On a loaded machine its work must then have begun, which no waiting time ensures. `number` is
+    that of the process, by default of `process`; with mpirun it is one that mpirun has started.
+    """
+    clock = os.sysconf("SC_CLK_TCK")
+    first = None
+    while process.poll() is None:
+        file = Path(f"/proc/{number or process.pid}/stat")
+        words = file.read_text().rpartition(")")[2].split()
+        used = (int(words[11]) + int(words[12])) / clock
+        first = used if first is None else first
+        if used - first > seconds:
+            return
+        time.sleep(0.05)
 
 
 def contents(path: Path) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], int]:
