@@ -50,6 +50,7 @@ module steady_guess
       integer, allocatable, private :: first(:)  !! [rows + 1] the first cell of each row in the list of C
    contains
       procedure :: prepare
+      procedure :: prepare_inverse
       procedure :: find_gap
       procedure :: correct
       procedure :: judge
@@ -78,12 +79,19 @@ contains
       if (.not. ready) return
       guess%pressure(:, :) = pressure
       guess%inside(:, :) = pressure > 0.0_dp
-      call guess%inverse%begin(operator)
-      guess%soft = guess%inverse%tiles%soft
       call guess%find_gap(operator, height)
       guess%level = field_mean(merge(guess%gap, 0.0_dp, guess%inside))*operator%grid%cells() &
          /max(field_count(guess%inside), 1.0_dp)
    end subroutine prepare
+
+   !> Prepare the approximate inverse by tiles for all sets of cells in contact.
+   subroutine prepare_inverse(guess, operator)
+      class(guess_type), intent(inout) :: guess
+      type(steady_operator_type), intent(inout) :: operator
+
+      call guess%inverse%begin(operator)
+      guess%soft = guess%inverse%tiles%soft
+   end subroutine prepare_inverse
 
    !> Compute U - H of the pressure, with the springs.
    subroutine find_gap(guess, operator, height)

@@ -6,8 +6,8 @@
 !> enough.
 !>
 !> Near the solution C settles in a few rounds, however many cells there are, where the splitting takes more and more
-!> iterations. There is no proof of it, and from a distant guess C oscillates. The attempt therefore ends as soon as
-!> it does not come closer, and the caller continues.
+!> iterations. There is no proof of it, and from a distant guess C oscillates. The attempt therefore ends at once if the
+!> error of the given pressure is large, and later as soon as it does not come closer. The caller then continues.
 module steady_newton
    use asperity_precision, only : dp
    use field_sums, only : field_count
@@ -23,7 +23,9 @@ module steady_newton
    integer, parameter :: patience = 3            !! an attempt ends after more rounds that do not come closer
    integer, parameter :: first_trial = 32        !! iteration of the splitting from which an attempt may save time
    real(dp), parameter :: price = 24.0_dp        !! of an attempt, in iterations of the splitting
-   real(dp), parameter :: near = 1.0e-3_dp       !! error of the splitting from which C usually settles
+   !> Errors from which C usually settles: that which the splitting estimates, and that of its pressure, which may be
+   !> much larger.
+   real(dp), parameter :: near = 1.0e-2_dp, near_indeed = 3.0e-2_dp
    real(dp), parameter :: accuracy = 0.1_dp      !! of a solution while C changes
    real(dp), parameter :: finest = 1.0e-4_dp     !! of any solution
 
@@ -61,6 +63,9 @@ contains
       success = .false.
       call guess%prepare(operator, height, pressure, solved)
       if (.not. solved) return
+      call guess%judge(operator, task, height, found, negative)
+      if (found%strict > near_indeed) return
+      call guess%prepare_inverse(operator)
       least = huge(1.0_dp)
       since = 0
       wanted = accuracy

@@ -189,7 +189,7 @@ contains
             progress%trial = n + n/2
             call finish_on_contact(operator, task, height, self%pressure, gap, found, outcome%converged)
          else if (promising(n, error, task%tolerance)) then
-            progress%trial = n + n/2
+            progress%trial = n + n/4
             call finish_by_newton(operator, task, height, self%pressure, gap, found, outcome%converged)
          end if
          if (outcome%converged .or. progress%stepped) return

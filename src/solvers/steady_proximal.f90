@@ -100,6 +100,7 @@ contains
       found%strict = huge(1.0_dp)
       call guess%prepare(operator, height, pressure, ready)
       if (.not. ready) return
+      call guess%prepare_inverse(operator)
       allocate (guess%centre, mold=pressure, stat=status)
       if (any_process(status /= 0)) return
       guess%most_directions = most_directions
