@@ -219,6 +219,11 @@ def test_restart(program: str, tmp_path: Path) -> None:
             "needs &adhesion potential = 'none'",
         ),
         ("&phase pressure = 1e5, velocity_x = 1 /", "needs a duration"),
+        (
+            "&friction law = 'coulomb', coefficient = 1e300 /"
+            " &phase steady = T, pressure = 1e5, velocity_x = 1 /",
+            "coefficient = 1e300: must be at most 1000 with a steady phase",
+        ),
     ],
 )
 def test_messages(program: str, tmp_path: Path, change: str, message: str) -> None:

@@ -16,7 +16,7 @@ module case_input
    use asperity_precision, only : dp
    use process_agreement, only : agree
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
-   use shear_laws, only : law_variables
+   use shear_laws, only : law_uses, law_variables
    use snapshot_fields, only : field_names, field_needs_friction
    use scale_warnings, only : cap_warning, oblong_warning, rows_warning, steepness_warning
    use surface_warnings, only : find_warnings, warning_length
@@ -88,6 +88,8 @@ contains
       call resolve_phases(pack_phases(groups), case%grid, case%material, &
          case%adhesion%potential /= 'none' .or. group%bad('potential'), case%phases, faults, case%warnings)
       call check_pulls(pack_phases(groups), case, faults)
+      call pick(groups, 'friction', group)
+      call check_steady_law(group, case, faults)
       call pick(groups, 'solver', group)
       call resolve_solver(group, case, faults)
       call pick(groups, 'output', group)
@@ -215,6 +217,19 @@ contains
          end do
       end do
    end subroutine check_pulls
+
+   !> Refuse a coefficient with which nothing can slide, if a phase is steady. The products of the solver would overflow
+   !> with a huge one.
+   subroutine check_steady_law(group, case, faults)
+      type(group_values_type), intent(in) :: group     !! friction
+      type(case_type), intent(in) :: case
+      type(faults_type), intent(inout) :: faults
+      real(dp), parameter :: most = 1000.0_dp
+
+      if (group%bad('coefficient') .or. .not. law_uses(case%friction%law, 'coefficient')) return
+      if (any(case%phases%steady) .and. case%friction%coefficient > most) call group%fault('coefficient', &
+         'must be at most 1000 with a steady phase: the rubber could hardly slide', faults)
+   end subroutine check_steady_law
 
    !> Resolve the group `&grid`.
    subroutine resolve_grid(group, grid, known, faults)

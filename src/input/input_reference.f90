@@ -197,7 +197,7 @@ contains
             'Bound of the tangential traction: coefficient times pressure, shear_strength, the lower of '// &
             'the two, or a table.'), &
          row('friction', 'coefficient', kind_real, '(required)', '', 'not negative', &
-            'Coulomb friction coefficient of the interface.'), &
+            'Coulomb friction coefficient of the interface; at most 1000 with a steady phase.'), &
          row('friction', 'shear_strength', kind_real, '(required)', 'Pa', 'positive', &
             'Shear strength of the interface.'), &
          row('friction', 'table_pressure', kind_reals, '(required)', 'Pa', 'not negative', &
