@@ -23,9 +23,11 @@ module steady_newton
    integer, parameter :: patience = 3            !! an attempt ends after more rounds that do not come closer
    integer, parameter :: first_trial = 32        !! iteration of the splitting from which an attempt may save time
    real(dp), parameter :: price = 24.0_dp        !! of an attempt, in iterations of the splitting
-   !> Errors from which C usually settles: that which the splitting estimates, and that of its pressure, which may be
-   !> much larger.
-   real(dp), parameter :: near = 1.0e-2_dp, near_indeed = 3.0e-2_dp
+   real(dp), parameter, public :: first_near = 1.0e-2_dp   !! estimated error from which C usually settles, see `promising`
+   real(dp), parameter :: later_near = 0.1_dp    !! factor of it after an attempt that has failed
+   real(dp), parameter :: underestimate = 3.0_dp !! error of the pressure over that which the splitting estimates, at most
+   !> Share of the negative pressures in the load, after the first round, from which C does not settle.
+   real(dp), parameter :: wrong = 3.0e-3_dp
    real(dp), parameter :: accuracy = 0.1_dp      !! of a solution while C changes
    real(dp), parameter :: finest = 1.0e-4_dp     !! of any solution
 
@@ -33,9 +35,11 @@ contains
 
    !> Is a state of the splitting so near the solution that an attempt may succeed, and would the splitting, at its pace
    !> so far, take long to come to the tolerance?
-   pure function promising(iteration, error, tolerance) result(yes)
+   pure function promising(iteration, error, near, tolerance) result(yes)
       integer, intent(in) :: iteration
-      real(dp), intent(in) :: error, tolerance
+      real(dp), intent(in) :: error              !! that the splitting estimates
+      real(dp), intent(in) :: near               !! error from which C usually settles
+      real(dp), intent(in) :: tolerance
       logical :: yes
       real(dp) :: left                           !! iterations
 
@@ -47,10 +51,11 @@ contains
 
    !> Solve, starting from a pressure with the right load. If this succeeds, the pressure is the solution, and its
    !> gap U - H and its error are returned. Otherwise the pressure is not changed.
-   subroutine finish_by_newton(operator, task, height, pressure, gap, found, success)
+   subroutine finish_by_newton(operator, task, height, near, pressure, gap, found, success)
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
       real(dp), intent(in) :: height(:, :)
+      real(dp), intent(inout) :: near            !! as in `promising`; smaller after a failure
       real(dp), intent(inout) :: pressure(:, :)
       real(dp), intent(inout) :: gap(:, :)
       type(gap_measure_type), intent(out) :: found
@@ -64,7 +69,8 @@ contains
       call guess%prepare(operator, height, pressure, solved)
       if (.not. solved) return
       call guess%judge(operator, task, height, found, negative)
-      if (found%strict > near_indeed) return
+      if (found%strict > underestimate*near) return
+      near = later_near*near
       call guess%prepare_inverse(operator)
       least = huge(1.0_dp)
       since = 0
@@ -83,7 +89,7 @@ contains
          since = since + 1
          if (error < 0.7_dp*least) since = 0
          least = min(least, error)
-         if (since > patience) return
+         if (since > patience .or. round == 1 .and. negative > wrong) return
          call join(guess, joined)
          wanted = accuracy
          if (.not. (joined .or. negative > 0.0_dp)) wanted = max(finest, min(accuracy, 0.3_dp*task%tolerance/error))

@@ -30,7 +30,7 @@ module steady_normal
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    use steady_active, only : finish_on_contact, worthwhile
-   use steady_newton, only : finish_by_newton, promising
+   use steady_newton, only : finish_by_newton, first_near, promising
    use steady_proximal, only : pays, solve_by_steps
    use steady_measure, only : measure_evaluation, steady_measure_type
    use steady_operator, only : steady_operator_type
@@ -51,6 +51,7 @@ module steady_normal
       real(dp) :: least = huge(1.0_dp)           !! least error so far
       real(dp) :: reference = huge(1.0_dp)       !! residual that later ones are compared to, Pa
       integer :: checks = 0                      !! times that the error was within the tolerance
+      real(dp) :: near = first_near              !! error from which Newton's method is tried
       integer :: trial = first_trial             !! iteration at which finishing on few cells is tried next
       logical :: stepped = .false.               !! proximal steps have been tried
       integer(int64) :: ffts_before = 0          !! of the operator, before the solve
@@ -188,9 +189,9 @@ contains
          if (worthwhile(touching, self%grid%cells(), int(operator%ffts - progress%ffts_before))) then
             progress%trial = n + n/2
             call finish_on_contact(operator, task, height, self%pressure, gap, found, outcome%converged)
-         else if (promising(n, error, task%tolerance)) then
+         else if (promising(n, error, progress%near, task%tolerance)) then
             progress%trial = n + n/4
-            call finish_by_newton(operator, task, height, self%pressure, gap, found, outcome%converged)
+            call finish_by_newton(operator, task, height, progress%near, self%pressure, gap, found, outcome%converged)
          end if
          if (outcome%converged .or. progress%stepped) return
          if (.not. pays(n, progress%least, task%tolerance, dense)) return
