@@ -733,7 +733,7 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--jobs", "0"], "jobs = 0"),
     ([ROAD, "--material", "r.nml", "--pressures", "-1e5"], "pressures[0] = -100000.0"),
     ([ROAD, "--material", "r.nml", "--coefficient", "1e300"],
-     "coefficient = 1e+300: must be a finite number >= 0 and <= 100"),
+     "coefficient = 1e+300: must be a finite number >= 0 and <= 1000"),
     ([ROAD, "--material", "r.nml", "--speeds", "1,1e200"],
      "speeds: 1e+200 m/s: must be from 1e-30 to 1e+30 m/s"),
     ([ROAD, "--material", "r.nml", "--speeds", "1e-200"], "speeds: 1e-200 m/s: must be from"),

@@ -83,15 +83,20 @@ def test_killed_before_the_root_group_was_written(program: str, tmp_path: Path) 
     assert not beginning.exists()
 
 
+GROUPS = ["snapshots", "checkpoint", "grid", "history", "losses", "material", "surface"]
+
+
 @pytest.mark.parametrize(("groups", "replaced"), [
-    (["snapshots", "checkpoint", "grid", "history", "losses", "material", "surface"], True),
+    (GROUPS, True),
     (["snapshots"], True),
     (["snapshots", "grid", "measurement"], False),
     (["surface"], False),
 ])
 def test_killed_before_the_attributes_were_written(
-        program: str, tmp_path: Path, groups: list[str], replaced: bool) -> None:
+        program: str, tmp_path: Path, reference: Path, groups: list[str], replaced: bool) -> None:
     """A kill may leave all groups of a result without any attribute; other files are kept."""
+    with h5py.File(reference) as file:
+        assert set(file) <= set(GROUPS)  # a new group has to be added to the test and the program
     case = tmp_path / "case.nml"
     case.write_text(vc.text())
     beginning = tmp_path / "case.h5.new"

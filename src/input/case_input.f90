@@ -218,8 +218,8 @@ contains
       end do
    end subroutine check_pulls
 
-   !> Refuse a coefficient with which nothing can slide, if a phase is steady. The products of the solver would overflow
-   !> with a huge one.
+   !> Refuse a coefficient with which the rubber could hardly slide, if a phase is steady. With a huge one the sums of
+   !> the solver would overflow.
    subroutine check_steady_law(group, case, faults)
       type(group_values_type), intent(in) :: group     !! friction
       type(case_type), intent(in) :: case

@@ -7,7 +7,8 @@
 !>
 !> Near the solution C settles in a few rounds, however many cells there are, where the splitting takes more and more
 !> iterations. There is no proof of it, and from a distant guess C oscillates. The attempt therefore ends at once if the
-!> error of the given pressure is large, and later as soon as it does not come closer. The caller then continues.
+!> error of the given pressure is large, after one round if much of the pressure is negative, and later as soon as it
+!> does not come closer. The caller then continues, and the next attempt begins from a smaller error.
 module steady_newton
    use asperity_precision, only : dp
    use field_sums, only : field_count
@@ -23,11 +24,11 @@ module steady_newton
    integer, parameter :: patience = 3            !! an attempt ends after more rounds that do not come closer
    integer, parameter :: first_trial = 32        !! iteration of the splitting from which an attempt may save time
    real(dp), parameter :: price = 24.0_dp        !! of an attempt, in iterations of the splitting
-   real(dp), parameter, public :: first_near = 1.0e-2_dp   !! estimated error from which C usually settles, see `promising`
-   real(dp), parameter :: later_near = 0.1_dp    !! factor of it after an attempt that has failed
-   real(dp), parameter :: underestimate = 3.0_dp !! error of the pressure over that which the splitting estimates, at most
-   !> Share of the negative pressures in the load, after the first round, from which C does not settle.
-   real(dp), parameter :: wrong = 3.0e-3_dp
+   !> Error, as the splitting estimates it, below which a first attempt usually succeeds.
+   real(dp), parameter, public :: first_near = 1.0e-2_dp
+   real(dp), parameter :: later_near = 0.1_dp    !! factor by which this error is smaller for the next attempt
+   real(dp), parameter :: underestimate = 3.0_dp !! largest error of the pressure itself, in units of this error
+   real(dp), parameter :: wrong = 3.0e-3_dp      !! largest part of the load by negative pressures after the first round
    real(dp), parameter :: accuracy = 0.1_dp      !! of a solution while C changes
    real(dp), parameter :: finest = 1.0e-4_dp     !! of any solution
 
@@ -38,7 +39,7 @@ contains
    pure function promising(iteration, error, near, tolerance) result(yes)
       integer, intent(in) :: iteration
       real(dp), intent(in) :: error              !! that the splitting estimates
-      real(dp), intent(in) :: near               !! error from which C usually settles
+      real(dp), intent(in) :: near               !! largest error from which an attempt is made
       real(dp), intent(in) :: tolerance
       logical :: yes
       real(dp) :: left                           !! iterations
@@ -55,7 +56,7 @@ contains
       type(steady_operator_type), intent(inout) :: operator
       type(normal_problem_type), intent(in) :: task
       real(dp), intent(in) :: height(:, :)
-      real(dp), intent(inout) :: near            !! as in `promising`; smaller after a failure
+      real(dp), intent(inout) :: near            !! as in `promising`; out: for the next attempt
       real(dp), intent(inout) :: pressure(:, :)
       real(dp), intent(inout) :: gap(:, :)
       type(gap_measure_type), intent(out) :: found

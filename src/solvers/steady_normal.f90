@@ -51,7 +51,7 @@ module steady_normal
       real(dp) :: least = huge(1.0_dp)           !! least error so far
       real(dp) :: reference = huge(1.0_dp)       !! residual that later ones are compared to, Pa
       integer :: checks = 0                      !! times that the error was within the tolerance
-      real(dp) :: near = first_near              !! error from which Newton's method is tried
+      real(dp) :: near = first_near              !! largest error from which Newton's method is tried
       integer :: trial = first_trial             !! iteration at which finishing on few cells is tried next
       logical :: stepped = .false.               !! proximal steps have been tried
       integer(int64) :: ffts_before = 0          !! of the operator, before the solve

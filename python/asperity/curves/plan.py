@@ -33,7 +33,7 @@ _TRANSFORMS = {True: (220.0, 0.08, 0.25), False: (50.0, 0.1, 0.4)}
 _OTHER_WORK = 6.0
 _RUN, _COMMAND = 0.02, 1.5
 _RANGE = 1e-30, 1e30    # allowed speeds, m/s, and pressures, Pa
-_LARGEST_COEFFICIENT = 100.0
+_LARGEST_COEFFICIENT = 1000.0  # that of steady phases
 _COMMAND_MEMORY = 130e6  # bytes, for the command itself
 
 
@@ -233,7 +233,7 @@ def plan_curve(
     patches : int
         Number of patches; at most those that the road has.
     coefficient : float
-        Coefficient of Coulomb's law in the interface, 0 to 100.
+        Coefficient of Coulomb's law in the interface, 0 to 1000.
     slope_effect : bool
         Let the law act on the true slope.
     angle : float, optional
