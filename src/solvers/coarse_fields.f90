@@ -12,6 +12,7 @@ module coarse_fields
 
    public :: coarse_grid, coarsen, refine_pressure
 
+   real(dp), parameter :: least_part = 1e-3_dp   !! of the nearest pressure that an interpolated one keeps at least
    real(dp), parameter :: ratio = 4.0_dp   !! cells of the grid to a cell of the coarse one along a side, about
 
 contains
@@ -126,8 +127,10 @@ contains
       end associate
    end function part_of
 
-   !> Interpolate a pressure of the coarse grid between the centres of its cells. The pressure remains zero on
-   !> coarse cells that do not touch: interpolated pressure would widen the contact by half a coarse cell. Collective.
+   !> Interpolate a pressure of the coarse grid between the centres of its cells by cubic polynomials: linear ones would
+   !> lose much of the shortest waves, which span four coarse cells if the waves of the road span sixteen of the grid. The
+   !> pressure is positive on exactly those coarse cells that touch: interpolated pressure would widen the contact by half
+   !> a coarse cell. Collective.
    subroutine refine_pressure(coarse, fine, values, threads, pressure)
       type(grid_type), intent(in) :: coarse, fine
       real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()], Pa
@@ -138,8 +141,8 @@ contains
       integer :: range(2), j, below
 
       range = [1, 0]
-      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row), &
-         below_centre(fine%ny, coarse%ny, fine%last_row) + 1]
+      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
+         below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
       allocate (rows(coarse%nx, range(2) - range(1) + 1))
       call fetch_rows(coarse, values, range, rows)
 
@@ -152,8 +155,7 @@ contains
             below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
             part = part_above(fine%ny, coarse%ny, row)
          end associate
-         between(:) = (1.0_dp - part)*rows(:, below) + part*rows(:, below + 1)
-         where (rows(:, below + nint(part)) <= 0.0_dp) between = 0.0_dp
+         between(:) = interpolate(part, rows(:, below - 1), rows(:, below), rows(:, below + 1), rows(:, below + 2))
          call refine_row(coarse, between, pressure(:, j))
       end do
       !$omp end parallel
@@ -164,22 +166,37 @@ contains
       type(grid_type), intent(in) :: coarse
       real(dp), intent(in) :: values(:)            !! [coarse%nx], Pa
       real(dp), intent(out) :: pressure(:)         !! Pa
-      real(dp) :: part, beside(2)
+      real(dp) :: beside(-1:2)
       integer :: i, k, below
 
       do i = 1, size(pressure)
          below = below_centre(size(pressure), coarse%nx, i)
-         part = part_above(size(pressure), coarse%nx, i)
          beside = 0.0_dp
-         do k = 1, 2
-            associate (column => coarse%column_at(below + k - 1))
+         do k = -1, 2
+            associate (column => coarse%column_at(below + k))
                if (column > 0) beside(k) = values(column)
             end associate
          end do
-         pressure(i) = 0.0_dp
-         if (beside(1 + nint(part)) > 0.0_dp) pressure(i) = (1.0_dp - part)*beside(1) + part*beside(2)
+         pressure(i) = interpolate(part_above(size(pressure), coarse%nx, i), beside(-1), beside(0), beside(1), beside(2))
       end do
    end subroutine refine_row
+
+   !> Interpolate between the middle two of four equidistant pressures by the cubic polynomial through all four. The
+   !> result is 0 where the nearest one is 0, and positive elsewhere.
+   elemental function interpolate(part, before, below, above, beyond) result(value)
+      real(dp), intent(in) :: part                 !! of the way from the second pressure to the third, 0 to 1
+      real(dp), intent(in) :: before, below, above, beyond   !! Pa
+      real(dp) :: value
+      real(dp) :: nearest
+
+      value = 0.0_dp
+      nearest = merge(below, above, nint(part) == 0)
+      if (nearest <= 0.0_dp) return
+      value = (1.0_dp - part)*below + part*above &
+         - part*(1.0_dp - part)*((2.0_dp - part)*(before - 2.0_dp*below + above) &
+         + (1.0_dp + part)*(below - 2.0_dp*above + beyond))/6.0_dp
+      value = max(value, least_part*nearest)
+   end function interpolate
 
    !> The last coarse cell whose centre does not lie beyond that of cell k of n; 0 before the first centre.
    elemental integer function below_centre(n, coarse, k)

@@ -2,8 +2,9 @@
 !>
 !> The model of the inverse operator B ~ |q| (wave numbers per cell) is a stencil of symbol
 !>     c0 + c1 (4 - 2 cos kx - 2 cos ky),
-!> which fits |q| well if q is large. The part that is missing below pi/16 per cell is added on the grid of
-!> block means (module `coarse_level`). With c0 = 0.7 the sum of both fits |q| within a factor of 1.8. (With
+!> which fits a multiple of |q| well if q is large. The part that is missing below pi/16 per cell is added on the grid of
+!> block means (module `coarse_level`), so that the multiple falls from that of the stencil there to 3 for the
+!> longest waves, about that of the short ones. With c0 = 0.7 the sum of both fits |q| within a factor of 1.8. (With
 !> c0 = 1 the factor is 2.1, but this is better if the residual is not extended.)
 !>
 !> The same grid holds the coarse part of W, an approximate inverse of the model on the cells N outside the
@@ -33,6 +34,7 @@ module schur_coarse
    real(dp), parameter, public :: stencil_c1 = 1.80063_dp   !! for cells of unit size
    real(dp), parameter, public :: om = 0.2_dp  !! constant part of W
    real(dp), parameter :: band = pi/16.0_dp    !! wave number per cell below which the coarse level acts
+   real(dp), parameter :: of_long_waves = 3.0_dp   !! model over wave number per cell for the longest waves
    real(dp), parameter :: least_shift = 0.03_dp, contact_shift = 0.7_dp
    real(dp), parameter :: power = 0.3_dp       !! of the share of N in w
 
@@ -97,9 +99,10 @@ contains
       real(dp), intent(in) :: h                        !! side of a cell, m
       integer, intent(in) :: first                     !! wave number along x of the first column
       real(dp), intent(out) :: missing(first:, 0:), model(first:, 0:)
-      real(dp) :: qx, qy, q, q_least
+      real(dp) :: qx, qy, q, q_least, at_band
       integer :: i, j
 
+      at_band = stencil(band, 0.0_dp)/band
       q_least = pi*h/max(merge(0.0_dp, grid%lx, grid%nx == 1), merge(0.0_dp, grid%ly, grid%ny == 1), h)
       do j = 0, ubound(missing, 2)
          do i = first, ubound(missing, 1)
@@ -107,7 +110,7 @@ contains
             qy = 2.0_dp*pi*j*h/grid%ly
             q = max(hypot(qx, qy), q_least)
             model(i, j) = stencil(qx, qy)
-            if (q < band) model(i, j) = q*stencil(band, 0.0_dp)/band
+            if (q < band) model(i, j) = q*(of_long_waves + (at_band - of_long_waves)*(q/band)**2)
             missing(i, j) = model(i, j) - stencil(qx, qy)
          end do
       end do
