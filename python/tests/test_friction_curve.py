@@ -529,6 +529,8 @@ def test_picture(curve, tmp_path):
     figure.savefig(tmp_path / "curve.png")
     legend = figure.legends[0].get_window_extent()
     assert not any(panel.get_window_extent().overlaps(legend) for panel in figure.axes)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts.count("95 % interval") == 1
     assert (tmp_path / "curve.png").stat().st_size > 20000
 
 

@@ -79,6 +79,9 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         places[-1].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         places[-1].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         places[-1].yaxis.set_minor_formatter(NullFormatter())
+        if any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in panels):
+            places[0].fill_between([], [], [], color="k", alpha=0.2, linewidth=0,
+                                   label="95 % interval")
         places[0].plot([], [], "k--", linewidth=0.9, label="Persson's theory")
         for some, marker, text in zip(flagged, _MARKERS, ("with warnings", "not converged"),
                                       strict=True):
