@@ -127,10 +127,10 @@ contains
       end associate
    end function part_of
 
-   !> Interpolate a pressure of the coarse grid between the centres of its cells by cubic polynomials: linear ones would
-   !> lose much of the shortest waves, which span four coarse cells if the waves of the road span sixteen of the grid. The
-   !> pressure is positive on exactly those coarse cells that touch: interpolated pressure would widen the contact by half
-   !> a coarse cell. Collective.
+   !> Interpolate a pressure of the coarse grid between the centres of its cells by cubic polynomials: linear ones
+   !> would lose much of the shortest waves, which span four coarse cells if the waves of the road span sixteen of the
+   !> grid. The pressure is positive on exactly those coarse cells that touch: interpolated pressure would widen the
+   !> contact by half a coarse cell. Collective.
    subroutine refine_pressure(coarse, fine, values, threads, pressure)
       type(grid_type), intent(in) :: coarse, fine
       real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()], Pa
@@ -177,7 +177,8 @@ contains
                if (column > 0) beside(k) = values(column)
             end associate
          end do
-         pressure(i) = interpolate(part_above(size(pressure), coarse%nx, i), beside(-1), beside(0), beside(1), beside(2))
+         pressure(i) = interpolate(part_above(size(pressure), coarse%nx, i), &
+            beside(-1), beside(0), beside(1), beside(2))
       end do
    end subroutine refine_row
 

@@ -2,10 +2,10 @@
 !>
 !> The model of the inverse operator B ~ |q| (wave numbers per cell) is a stencil of symbol
 !>     c0 + c1 (4 - 2 cos kx - 2 cos ky),
-!> which fits a multiple of |q| well if q is large. The part that is missing below pi/16 per cell is added on the grid of
-!> block means (module `coarse_level`), so that the multiple falls from that of the stencil there to 3 for the
+!> which fits a multiple of |q| well if q is large. The part that is missing below pi/16 per cell is added on the grid
+!> of block means (module `coarse_level`), so that the multiple falls from that of the stencil there to 3 for the
 !> longest waves, about that of the short ones. With c0 = 0.7 the sum of both fits |q| within a factor of 1.8. (With
-!> c0 = 1 the factor is 2.1, but this is better if the residual is not extended.)
+!> c0 = 1 the factor is larger, but this is better if the residual is not extended.)
 !>
 !> The same grid holds the coarse part of W, an approximate inverse of the model on the cells N outside the
 !> contact:
