@@ -74,7 +74,7 @@ contains
       call check_no_error(error, 'a coarse level')
       call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
       allocate (s%memory(nx, ny))
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error, extends=.true.)
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
       call check_no_error(error, 'a preconditioner')
       n = nx*ny
       allocate (b(n, n), unit(n), r(n), z(n))

@@ -41,7 +41,6 @@ module coarse_level
       type(row_sharing_type) :: sharing            !! of the rows of blocks where the level is divided
       integer, allocatable :: first_y(:)           !! first row of a block among those of this process, [ny + 1]
       real(dp), allocatable :: mean(:, :)          !! block means, (nx, held(1):held(2))
-      real(dp), allocatable :: share(:, :)         !! part of a block that is in use, of the same shape
       logical, private :: copied = .false.         !! all processes hold the sums of all blocks
       real(dp), private :: fine_symbol = 0.0_dp    !! symbol of A for waves of the size of a block
       type(convolution_type), private :: normal
@@ -93,7 +92,7 @@ contains
       divided = grid%shared .and. real(self%nx, dp)*self%ny >= many_blocks
       self%copied = grid%shared .and. .not. divided
       self%held = merge(self%strips, [1, self%ny], divided)
-      allocate (self%mean(self%nx, self%held(1):self%held(2)), self%share(self%nx, self%held(1):self%held(2)))
+      allocate (self%mean(self%nx, self%held(1):self%held(2)))
 
       owner = owners_on_grid(grid)
       owner = owner([(grid%strip_start(j), j=1, self%ny)])

@@ -188,8 +188,7 @@ contains
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
             call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction, self%step)
-            call work%active%list_wide_runs(work%preconditioner%search, &
-               far=far_rim_pays(cells, measure%contact))
+            call work%active%list_wide_runs(work%preconditioner%search, far=far_rim_pays(cells))
          end associate
       end subroutine measure_state
 

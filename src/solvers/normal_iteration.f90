@@ -1,9 +1,16 @@
 !> The choices of an iteration of module `normal_cg`: the direction, the step along it and the part of the step that
 !> is taken.
 !>
-!> A trial pressure P + alpha d is projected on the admissible pressures, which gives the clipped step s. The multiple
-!> of s that minimises the energy then follows from the product A s. alpha comes from a prediction of d.A d on the block
-!> means, which the ratio kappa of the last true product to its prediction corrects.
+!> The cells in which the trial pressure P + alpha d is negative are released: the direction on the other cells changes by
+!> what the model of the preconditioner says (module `schur_release`). The trial pressure is then projected on the
+!> admissible pressures, which gives the clipped step s. The multiple of s that minimises the energy follows from the
+!> product A s.
+!>
+!> The eigenvalues of M A lie within a factor of two, whatever the contact and the grid, so that one value of alpha fits
+!> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
+!> a step that did not lower the energy is alpha smaller, by the factor kappa. Along directions of another kind
+!> (those of very oblong cells, and plain ones), alpha comes from a prediction of d.A d on the block means, which the
+!> ratio kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
@@ -16,11 +23,12 @@
 module normal_iteration
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
-   use normal_passes, only : new_direction, normal_work_type, overlap_with
+   use normal_passes, only : new_direction, normal_work_type, overlap_with, predict_form
    use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type
    use regular_grid, only : boundary_periodic
+   use schur_release, only : trial_type
    implicit none
    private
 
@@ -32,19 +40,19 @@ module normal_iteration
    integer, parameter :: phase_plain = 3
    integer, parameter :: phase_ended = 4
 
-   ! kappa is the ratio of the true d.A d to the predicted one. A step along which the energy does not decrease, or
-   ! hardly decreases, makes kappa four times larger and thus the next trial shorter.
+   ! A step along which the energy does not decrease, or hardly decreases, makes kappa four times larger and thus the next
+   ! trial shorter.
+   real(dp), parameter :: shortening = 4.0_dp
    real(dp), parameter :: often_shortened = 1e3_dp   !! kappa from which the direction is the plain residual
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to reduce the energy
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
 
-   ! Steps by which the preconditioner extends the residual. More steps save iterations only if many cells touch:
-   ! the gaps between them are then narrow, and the coarse level does not resolve them.
-   integer, parameter :: few_steps = 2, more_steps = 3, most_steps = 4
-   real(dp), parameter :: some_contact = 0.03_dp  !! part of the cells in contact from which the far rim saves time
-   real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells in contact from which more steps save time
-   real(dp), parameter :: large = 1.5e6_dp        !! cells of a grid from which the far rim and most steps save time
+   ! Steps by which the preconditioner extends the residual before and after the release of cells, for the numbers of cells
+   ! of a grid from which they save time.
+   real(dp), parameter :: medium = 1e5_dp, large = 1.5e6_dp, huge_grid = 3e7_dp
+   integer, parameter :: steps_before(4) = [1, 1, 3, 3]
+   integer, parameter :: steps_after(4) = [2, 3, 4, 6]
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
@@ -53,10 +61,9 @@ module normal_iteration
    !> The numbers that an iteration passes to the next one.
    type :: iteration_type
       integer :: phase = phase_restart
-      real(dp) :: kappa = 1.0_dp            !! true d.A d over its prediction
+      real(dp) :: kappa = 1.0_dp            !! by which trials are shorter than the model says
       real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
       real(dp) :: slope = 0.0_dp            !! r.d
-      real(dp) :: square = 0.0_dp           !! d.d
       real(dp) :: alpha = 0.0_dp            !! multiple of the step that is taken; 0: rejected
       character(64) :: reason = reason_iterations   !! why the loop ended
    end type iteration_type
@@ -73,12 +80,18 @@ contains
    end subroutine end_loop
 
    !> Does it save time to extend the residual to a wider rim around the contact?
-   pure logical function far_rim_pays(cells, contact)
+   pure logical function far_rim_pays(cells)
       real(dp), intent(in) :: cells                    !! of the grid
-      real(dp), intent(in) :: contact                  !! part of the cells
 
-      far_rim_pays = cells >= large .and. contact > some_contact
+      far_rim_pays = cells >= large
    end function far_rim_pays
+
+   !> The place of a grid in `steps_before` and `steps_after`.
+   pure integer function size_class(cells)
+      real(dp), intent(in) :: cells                    !! of the grid
+
+      size_class = 1 + count(cells >= [medium, large, huge_grid])
+   end function size_class
 
    !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
    subroutine choose_direction(work, task, measure, pressure, gap, before, now)
@@ -89,16 +102,13 @@ contains
       real(dp), contiguous, intent(inout) :: before(:, :)  !! work field, for the residual before
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta
-      integer :: steps
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load
-      steps = few_steps
-      if (measure%contact > much_contact) steps = merge(most_steps, more_steps, work%grid%cells() >= large)
-      call work%preconditioner%extend(work%coarse, work%active, steps, rz)
+      call work%preconditioner%extend(work%coarse, work%active, steps_before(size_class(work%grid%cells())), rz)
       if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
          call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
       beta = 0.0_dp
@@ -107,13 +117,13 @@ contains
       now%slope = 0.0_dp
       if (now%phase /= phase_plain) then
          now%phase = phase_conjugate
-         call new_direction(work, fixed_load, .true., beta, pressure, now%slope, now%square)
+         call new_direction(work, fixed_load, .true., beta, pressure, now%slope)
          if (now%slope <= 0.0_dp .and. beta > 0.0_dp) &
-            call new_direction(work, fixed_load, .true., 0.0_dp, pressure, now%slope, now%square)
+            call new_direction(work, fixed_load, .true., 0.0_dp, pressure, now%slope)
       end if
       if (now%slope <= 0.0_dp) then
          now%phase = phase_restart
-         call new_direction(work, fixed_load, .false., 0.0_dp, pressure, now%slope, now%square)
+         call new_direction(work, fixed_load, .false., 0.0_dp, pressure, now%slope)
       end if
       if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
    end subroutine choose_direction
@@ -163,17 +173,24 @@ contains
       type(trial_sums_type) :: trial
       type(step_sums_type) :: sums
       type(clip_type) :: clip
-      real(dp) :: predicted, alpha
+      real(dp) :: alpha
+      logical :: fixed_load
 
       now%alpha = 0.0_dp
       if (now%phase == phase_ended) return
-      predicted = work%coarse%predict_form(now%square)/task%modulus
-      alpha = now%slope/max(now%kappa*predicted, tiny(1.0_dp))
+      fixed_load = task%control == control_pressure
+      alpha = trial_length(work, task%modulus, now)
+      if (fits_model(work, now)) call work%preconditioner%release(work%coarse, work%active, &
+         steps_after(size_class(work%grid%cells())), trial_type(alpha, work%offset), pressure, work%direction)
       call try_pressure(work, alpha, pressure, step, trial)
+      if (trial%cells < 1.0_dp .and. fixed_load) then
+         call shorten(now)
+         return
+      end if
       if (work%preconditioner%by_waves .and. now%phase == phase_conjugate) &
          call keep_block_sums(work, step, trial)
-      call find_clip(work, task%control == control_pressure, &
-         task%target*work%grid%nx*work%grid%ny, step, trial, clip)
+      call find_clip(work, fixed_load, task%target*work%grid%cells(), step, trial, clip)
+      if (work%preconditioner%released) work%offset = work%offset + clip%shift/alpha
       call clip_step(work, product, clip, level, pressure, gap, step, sums)
       if (sums%slope > 0.0_dp) then
          call choose_length(work, product, task%modulus, pressure, step, clip%clipped, sums, now)
@@ -181,6 +198,28 @@ contains
          call shorten(now)
       end if
    end subroutine choose_step
+
+   !> Is the direction M r + beta d with the M of the local model?
+   pure logical function fits_model(work, now)
+      type(normal_work_type), intent(in) :: work
+      type(iteration_type), intent(in) :: now
+
+      fits_model = now%phase == phase_conjugate .and. .not. work%preconditioner%by_waves
+   end function fits_model
+
+   !> The multiple alpha of the direction for the trial pressure.
+   function trial_length(work, modulus, now) result(alpha)
+      type(normal_work_type), intent(inout) :: work
+      real(dp), intent(in) :: modulus                  !! Pa
+      type(iteration_type), intent(in) :: now
+      real(dp) :: alpha
+
+      if (fits_model(work, now)) then
+         alpha = modulus/(max(now%kappa, 1.0_dp)*work%preconditioner%compliance*work%scale)
+      else
+         alpha = now%slope*modulus/max(now%kappa*predict_form(work), tiny(1.0_dp))
+      end if
+   end function trial_length
 
    !> Make the next trial shorter. After many such calls the direction becomes the plain residual, and then the loop
    !> ends.
@@ -190,7 +229,7 @@ contains
       if (now%kappa > hopeless) then
          call end_loop(now, 'no step lowers the energy')
       else
-         now%kappa = 4.0_dp*now%kappa
+         now%kappa = shortening*now%kappa
          now%phase = merge(phase_plain, phase_restart, now%kappa > often_shortened)
       end if
    end subroutine shorten
@@ -212,9 +251,13 @@ contains
          call end_loop(now, 'no direction of descent is left')
          return
       end if
-      predicted = work%coarse%predict_form(sums%square)/modulus
       before = now%kappa
-      now%kappa = min(max(form/max(predicted, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
+      if (fits_model(work, now)) then
+         now%kappa = max(before/shortening, 1.0_dp)
+      else
+         predicted = work%coarse%predict_form(sums%square)/modulus
+         now%kappa = min(max(form/max(predicted, tiny(1.0_dp)), 0.1_dp), 10.0_dp)
+      end if
       now%alpha = sums%slope/form
       if (.not. now%alpha > 0.0_dp) then
          call end_loop(now, 'no direction of descent is left')

@@ -11,14 +11,14 @@ module normal_passes
    use normal_state, only : row_measure
    use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
-   use normal_sweeps, only : direction_cells, load_cells, overlap_cells
+   use normal_sweeps, only : direction_cells, load_cells, overlap_cells, spread_cells
    use asperity_precision, only : dp, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private
 
-   public :: new_direction, new_normal_work, normal_work_type, overlap_with, survey, update_state
+   public :: new_direction, new_normal_work, normal_work_type, overlap_with, predict_form, survey, update_state
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
    type :: normal_work_type
@@ -32,13 +32,6 @@ module normal_passes
       real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
       type(state_sums_type), allocatable :: state(:)   !! of each row of the present state
    end type normal_work_type
-
-   !> Values along x that the rows of a coarse block share.
-   type :: strip_type
-      real(sp), allocatable :: correction(:)         !! coarse part of z
-      real(sp), allocatable :: column(:)             !! sums of the direction over the rows
-      real(sp), allocatable :: shares(:)             !! numbers of cells in which it acts
-   end type strip_type
 
 contains
 
@@ -57,7 +50,7 @@ contains
       if (.not. allocated(error)) call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, &
          self%threads, operator%spectrum_memory(), error)
       if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse%first_y, &
-         self%coarse%strips, self%preconditioner%extends, self%threads)
+         self%coarse%strips, .not. self%preconditioner%by_waves, self%threads)
    end subroutine new_normal_work
 
    !> Find out which blocks have pressure, the least gap of each block, and the sums of the state.
@@ -91,7 +84,7 @@ contains
       allocate (correction(self%grid%nx))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
-         correction(:) = real(self%preconditioner%blocks%pending(self%coarse%block_x, jb), sp)
+         correction(:) = self%preconditioner%correction(self%coarse, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             ! The response is not set where the length is 0.
             response => self%preconditioner%image(:, j)
@@ -110,57 +103,76 @@ contains
    end function overlap_with
 
    !> Compute direction = z + beta direction where it acts: on S, except in cells without pressure in which z is
-   !> negative. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the products and
-   !> block means are those after its subtraction.
-   subroutine new_direction(self, fixed_load, preconditioned, beta, pressure, slope, square)
+   !> negative. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the product r.d is
+   !> that after its subtraction.
+   subroutine new_direction(self, fixed_load, preconditioned, beta, pressure, slope)
       type(normal_work_type), intent(inout) :: self
       logical, intent(in) :: fixed_load              !! the direction may not change the load
       logical, intent(in) :: preconditioned          !! z = M r, else z = r
       real(dp), intent(in) :: beta
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
       real(dp), intent(out) :: slope                 !! r.d
-      real(dp), intent(out) :: square                !! d.d
       type(direction_sums_type), allocatable :: rows(:)
       type(direction_sums_type) :: sums
-      type(strip_type) :: strip
+      real(sp), allocatable :: correction(:)         !! coarse part of z
       integer :: j, jb
 
       allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, preconditioned, beta, pressure, rows) &
-      !$omp private(j, jb, strip) num_threads(self%threads)
-      allocate (strip%correction(self%grid%nx), strip%column(self%grid%nx), strip%shares(self%grid%nx))
+      !$omp private(j, jb, correction) num_threads(self%threads)
+      allocate (correction(self%grid%nx))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
-         strip%correction(:) = 0.0_sp
-         if (preconditioned) &
-            strip%correction(:) = real(self%preconditioner%blocks%pending(self%coarse%block_x, jb), sp)
-         strip%column(:) = 0.0_sp
-         strip%shares(:) = 0.0_sp
+         correction(:) = 0.0_sp
+         if (preconditioned) correction(:) = self%preconditioner%correction(self%coarse, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            call direction_row(self, preconditioned, beta, j, pressure(:, j), strip, rows(j))
+            call direction_row(self, preconditioned, beta, j, pressure(:, j), correction, rows(j))
          end do
-         call self%coarse%sum_blocks(strip%column, self%coarse%mean(:, jb))
-         call self%coarse%sum_blocks(strip%shares, self%coarse%share(:, jb))
       end do
       !$omp end parallel
-      call self%coarse%share_blocks(self%coarse%mean)
-      call self%coarse%share_blocks(self%coarse%share)
       sums = total(rows)
       self%offset = 0.0_dp
       if (fixed_load) self%offset = sums%value/max(sums%cells, 1.0_dp)
       slope = (sums%slope - self%offset*sums%residual)/self%scale
-      square = sums%square - self%offset*sums%value
-      self%coarse%mean(:, :) = (self%coarse%mean - self%offset*self%coarse%share)/self%coarse%cells
    end subroutine new_direction
 
+   !> Predict d.A d for the direction d, for a modulus of 1, from its block means.
+   function predict_form(self) result(form)
+      type(normal_work_type), intent(inout) :: self
+      real(dp) :: form
+      real(dp), allocatable :: squares(:), column(:)
+      integer :: j, k, jb
+
+      allocate (squares(self%grid%rows()), source=0.0_dp)
+      !$omp parallel default(none) shared(self, squares) private(j, k, jb, column) num_threads(self%threads)
+      allocate (column(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
+         column(:) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j))
+                  call spread_cells(self%active%last(k, j) - first + 1, self%offset, self%direction(first, j), &
+                     column(first), squares(j))
+               end associate
+            end do
+         end do
+         call self%coarse%sum_blocks(column, self%coarse%mean(:, jb))
+         self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
+      end do
+      !$omp end parallel
+      call self%coarse%share_blocks(self%coarse%mean)
+      form = self%coarse%predict_form(row_total(squares))
+   end function predict_form
+
    !> Compute the direction in a row.
-   subroutine direction_row(self, preconditioned, beta, j, pressure, strip, sums)
+   subroutine direction_row(self, preconditioned, beta, j, pressure, correction, sums)
       type(normal_work_type), intent(inout), target :: self
       logical, intent(in) :: preconditioned
       real(dp), intent(in) :: beta
       integer, intent(in) :: j
       real(dp), intent(in) :: pressure(self%grid%nx)
-      type(strip_type), intent(inout) :: strip
+      real(sp), intent(in) :: correction(self%grid%nx)
       type(direction_sums_type), intent(out) :: sums
       real(sp), pointer, contiguous :: image(:), response(:)
       real(sp) :: length
@@ -174,9 +186,9 @@ contains
       if (length > 0.0_sp) response => self%preconditioner%response(:, j)
       do k = 1, self%active%runs(j)
          associate (a => self%active%first(k, j), b => self%active%last(k, j))
-            call direction_cells(b - a + 1, length, image(a:b), response(a:b), strip%correction(a:b), &
+            call direction_cells(b - a + 1, length, image(a:b), response(a:b), correction(a:b), &
                self%preconditioner%residual(a:b, j), real(beta, sp), real(self%offset, sp), pressure(a:b), &
-               self%direction(a:b, j), strip%column(a:b), strip%shares(a:b), sums)
+               self%direction(a:b, j), sums)
          end associate
       end do
    end subroutine direction_row

@@ -5,12 +5,12 @@
 !> field `step` holds first the trial pressure and then the step. As in module `normal_passes`, only the active blocks
 !> are visited, and the innermost loops are in module `normal_sweeps`.
 module normal_projection
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, sp
    use fft_conv, only : convolution_type
    use field_sums, only : least_of_rows
    use normal_passes, only : normal_work_type
    use normal_sums, only : step_sums_type, total, trial_sums_type
-   use normal_sweeps, only : above_cells, clip_cells, longest_cells, trial_cells
+   use normal_sweeps, only : above_cells, changed_trial_cells, clip_cells, longest_cells, trial_cells
    implicit none
    private
 
@@ -25,9 +25,10 @@ module normal_projection
 
 contains
 
-   !> Compute step = trial pressure P + alpha (direction - offset), and its sums above 0.
+   !> Compute step = trial pressure P + alpha (direction - offset), and its sums above 0. If cells were released, the
+   !> direction changes by what the preconditioner found.
    subroutine try_pressure(self, alpha, pressure, step, sums)
-      type(normal_work_type), intent(in) :: self
+      type(normal_work_type), intent(inout) :: self
       real(dp), intent(in) :: alpha
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
       real(dp), intent(inout) :: step(self%grid%nx, self%grid%rows())
@@ -36,6 +37,11 @@ contains
       integer :: j, k, n
 
       allocate (rows(self%grid%rows()))
+      if (self%preconditioner%released) then
+         call try_changed_pressure(self, alpha, pressure, step, rows)
+         sums = total(rows)
+         return
+      end if
       !$omp parallel do default(none) shared(self, alpha, pressure, step, rows) &
       !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%threads)
       do j = 1, self%grid%rows()
@@ -51,6 +57,40 @@ contains
       end do
       sums = total(rows)
    end subroutine try_pressure
+
+   !> Do the same after a release of cells.
+   subroutine try_changed_pressure(self, alpha, pressure, step, rows)
+      type(normal_work_type), intent(inout), target :: self
+      real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
+      real(dp), intent(inout) :: step(self%grid%nx, self%grid%rows())
+      type(trial_sums_type), intent(out) :: rows(:)
+      real(sp), allocatable :: correction(:)
+      real(sp), pointer, contiguous :: response(:)
+      integer :: j, k, jb
+
+      !$omp parallel default(none) shared(self, alpha, pressure, step, rows) &
+      !$omp private(j, k, jb, correction, response) num_threads(self%threads)
+      allocate (correction(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
+         correction(:) = self%preconditioner%correction(self%coarse, jb)
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            ! The response is not set where the length is 0.
+            response => self%preconditioner%image(:, j)
+            if (self%preconditioner%length > 0.0_sp) response => self%preconditioner%response(:, j)
+            rows(j) = trial_sums_type()
+            do k = 1, self%active%runs(j)
+               associate (a => self%active%first(k, j), b => self%active%last(k, j))
+                  call changed_trial_cells(b - a + 1, alpha, self%offset, self%preconditioner%length, &
+                     self%preconditioner%image(a:b, j), response(a:b), correction(a:b), &
+                     self%preconditioner%residual(a:b, j), pressure(a:b, j), self%direction(a:b, j), step(a:b, j), rows(j))
+               end associate
+            end do
+         end do
+      end do
+      !$omp end parallel
+   end subroutine try_changed_pressure
 
    !> Subtract from the trial pressure in `step` a number per block, so that the sum of each block remains what it is if
    !> negative pressures become 0. The sums of the blocks of very oblong cells are stiff: if they change, the energy
@@ -130,6 +170,10 @@ contains
    !> Find the projection of the trial pressure in `step` on the admissible pressures. If the load is given, this is
    !> the shift t for which max(trial - t, 0) has the sum of the load, found by Newton's method from below. If the
    !> trial pressure is far above the load, round-off limits the accuracy of this sum, and a factor corrects it.
+   !>
+   !> After a release of cells the sum may also be too small, because the offset of the direction is that before the
+   !> release. The first step of Newton's method then leads below t, which may be negative because no projection gives
+   !> pressure to cells that were released.
    subroutine find_clip(self, fixed_load, load, step, sums, clip)
       type(normal_work_type), intent(in) :: self
       logical, intent(in) :: fixed_load
@@ -140,21 +184,24 @@ contains
       type(trial_sums_type), allocatable :: rows(:)
       type(trial_sums_type) :: above
       real(dp) :: kept, next
+      logical :: first                               !! the sum may be too small
       integer :: j, k, n
 
       clip%clipped = sums%least < 0.0_dp
-      if (.not. (fixed_load .and. clip%clipped)) return
+      if (.not. fixed_load .or. .not. (clip%clipped .or. self%preconditioner%released)) return
       allocate (rows(self%grid%rows()))
       above = sums
       kept = load
       next = 0.0_dp
+      first = self%preconditioner%released
       do
          if (above%cells < 1.0_dp) exit                   ! too far: the shift before is the best one
          clip%shift = next
          kept = above%above
-         if (kept - load <= 1e-15_dp*load) exit
+         if (kept - load <= 1e-15_dp*load .and. .not. first) exit
          next = clip%shift + (kept - load)/above%cells
-         if (next <= clip%shift) exit                    ! the limit of round-off is reached
+         if (next <= clip%shift .and. .not. first) exit  ! the limit of round-off is reached
+         first = .false.
          !$omp parallel do default(none) shared(self, step, next, rows) private(j, k, n) &
          !$omp schedule(dynamic, 8) num_threads(self%threads)
          do j = 1, self%grid%rows()

@@ -17,7 +17,6 @@ module normal_sums
       real(dp) :: cells = 0.0_dp            !! number of cells where d acts
       real(dp) :: slope = 0.0_dp            !! r d
       real(dp) :: residual = 0.0_dp         !! r where d acts
-      real(dp) :: square = 0.0_dp           !! d^2
    end type direction_sums_type
 
    !> Sums of a trial pressure above a limit.
@@ -54,10 +53,10 @@ contains
    function total_direction(rows) result(sums)
       type(direction_sums_type), intent(in) :: rows(:)
       type(direction_sums_type) :: sums
-      real(dp) :: t(5)
+      real(dp) :: t(4)
 
-      t = totals_of([rows%value, rows%cells, rows%slope, rows%residual, rows%square], 5)
-      sums = direction_sums_type(value=t(1), cells=t(2), slope=t(3), residual=t(4), square=t(5))
+      t = totals_of([rows%value, rows%cells, rows%slope, rows%residual], 4)
+      sums = direction_sums_type(value=t(1), cells=t(2), slope=t(3), residual=t(4))
    end function total_direction
 
    !> Sums of a trial pressure over the grid.

@@ -12,13 +12,13 @@ module normal_sweeps
    implicit none
    private
 
-   public :: above_cells, clip_cells, direction_cells, load_cells, longest_cells, &
-      overlap_cells, residual_cells, trial_cells
+   public :: above_cells, changed_trial_cells, clip_cells, direction_cells, load_cells, longest_cells, &
+      overlap_cells, residual_cells, spread_cells, trial_cells
 
 contains
 
    !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere. The residual before is
-   !> kept.
+   !> kept. Other passes assume that a cell is in S if its residual is not 0, so it must not be 0 there.
    pure subroutine residual_cells(n, scale, level, pressure, gap, residual, before, column)
       integer, intent(in) :: n
       real(dp), intent(in) :: scale, level
@@ -26,6 +26,7 @@ contains
       real(sp), intent(inout) :: residual(n)
       real(dp), intent(inout) :: before(n)
       real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
+      real(dp), parameter :: least = tiny(1.0_sp)
       real(dp) :: g
       integer :: i
 
@@ -33,7 +34,7 @@ contains
       do i = 1, n
          before(i) = residual(i)
          g = level - gap(i)
-         residual(i) = real(scale*g*positive(max(g, pressure(i))), sp)
+         residual(i) = real(positive(max(g, pressure(i)))*sign(max(abs(scale*g), least), g), sp)
          column(i) = column(i) + residual(i)
       end do
    end subroutine residual_cells
@@ -58,7 +59,7 @@ contains
    !> Compute direction = z + beta (direction - offset) with z = M r where it acts: on S, except in cells without
    !> pressure in which z is negative.
    pure subroutine direction_cells(n, length, image, response, correction, residual, beta, offset, &
-      pressure, direction, column, shares, sums)
+      pressure, direction, sums)
       integer, intent(in) :: n
       real(sp), intent(in) :: length
       real(sp), intent(in) :: image(n), response(n), correction(n)   !! z = image + length response + ...
@@ -67,12 +68,10 @@ contains
       real(sp), intent(in) :: offset                !! mean of the old direction
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(inout) :: direction(n)
-      real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
-      real(sp), intent(inout) :: shares(n)          !! numbers of cells where it acts, over the rows of a block
       type(direction_sums_type), intent(inout) :: sums
       ! Other passes assume that d acts where it is not 0, so it must not be 0 where it acts.
       real(sp), parameter :: least = tiny(1.0_sp)
-      real(dp) :: total, cells, product, residuals, square
+      real(dp) :: total, cells, product, residuals
       real(sp) :: z, d, inside
       integer :: i
 
@@ -80,27 +79,42 @@ contains
       cells = 0.0_dp
       product = 0.0_dp
       residuals = 0.0_dp
-      square = 0.0_dp
-      !$omp simd reduction(+:total, cells, product, residuals, square) private(z, d, inside)
+      !$omp simd reduction(+:total, cells, product, residuals) private(z, d, inside)
       do i = 1, n
          z = image(i) + length*response(i) + correction(i)
          inside = real(positive(max(pressure(i), real(min(abs(residual(i)), z), dp))), sp)
          d = inside*(z + beta*(direction(i) - offset*acts(direction(i))) + least)
          direction(i) = d
-         column(i) = column(i) + d
-         shares(i) = shares(i) + inside
          total = total + d
          cells = cells + inside
          product = product + residual(i)*d
          residuals = residuals + residual(i)*inside
-         square = square + d**2
       end do
       sums%value = sums%value + total
       sums%cells = sums%cells + cells
       sums%slope = sums%slope + product
       sums%residual = sums%residual + residuals
-      sums%square = sums%square + square
    end subroutine direction_cells
+
+   !> Add direction - offset, where it acts, to the sums over the rows of a block, and its square to a sum.
+   pure subroutine spread_cells(n, offset, direction, column, square)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: offset
+      real(sp), intent(in) :: direction(n)
+      real(dp), intent(inout) :: column(n)
+      real(dp), intent(inout) :: square
+      real(dp) :: total, d
+      integer :: i
+
+      total = 0.0_dp
+      !$omp simd reduction(+:total) private(d)
+      do i = 1, n
+         d = direction(i) - offset*acts(direction(i))
+         column(i) = column(i) + d
+         total = total + d**2
+      end do
+      square = square + total
+   end subroutine spread_cells
 
    !> Compute trial = P + alpha (direction - offset), and its sums above the limit 0.
    pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums)
@@ -128,6 +142,46 @@ contains
       sums%cells = sums%cells + cells
       sums%least = lowest
    end subroutine trial_cells
+
+   !> Add the change that the release of cells has caused to the direction, and compute
+   !> trial = P + alpha (direction - offset) and its sums above 0. In the cells that were released, and in all others in
+   !> which the direction does not act, the trial pressure is so low that it will be 0 after any projection. (Their
+   !> least trial pressure counts as -P.)
+   pure subroutine changed_trial_cells(n, alpha, offset, length, image, response, correction, residual, pressure, &
+      direction, trial, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: alpha, offset
+      real(sp), intent(in) :: length
+      real(sp), intent(in) :: image(n), response(n), correction(n)   !! change = image + length response + ...
+      real(sp), intent(in) :: residual(n)
+      real(dp), intent(in) :: pressure(n)
+      real(sp), intent(inout) :: direction(n)
+      real(dp), intent(inout) :: trial(n)
+      type(trial_sums_type), intent(inout) :: sums
+      real(dp), parameter :: lowest = -huge(1.0_dp)
+      real(dp) :: total, cells, least, kept, value
+      real(sp) :: d, inside
+      integer :: i
+
+      total = 0.0_dp
+      cells = 0.0_dp
+      least = sums%least
+      !$omp simd reduction(+:total, cells) reduction(min:least) private(d, inside, kept, value)
+      do i = 1, n
+         inside = acts(residual(i))*acts(direction(i))
+         d = inside*(direction(i) + (image(i) + length*response(i) + correction(i)))
+         direction(i) = d
+         kept = inside
+         value = kept*(pressure(i) + alpha*(d - offset))
+         trial(i) = value + (1.0_dp - kept)*lowest
+         total = total + max(value, 0.0_dp)
+         cells = cells + positive(value)
+         least = min(least, value - (1.0_dp - kept)*pressure(i))
+      end do
+      sums%above = sums%above + total
+      sums%cells = sums%cells + cells
+      sums%least = least
+   end subroutine changed_trial_cells
 
    !> Sum of the parts of the values above a limit, and the number of such values.
    pure subroutine above_cells(n, limit, values, sums)

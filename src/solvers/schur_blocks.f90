@@ -28,6 +28,7 @@ module schur_blocks
    type :: schur_blocks_type
       type(schur_coarse_type) :: model            !! the coarse part of the model
       integer, private :: threads = 1
+      real(dp) :: shift = 0.0_dp                  !! part of M r that is the same in all cells (`shift_mean`)
       real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
       real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
       real(dp), allocatable, private :: addition(:, :)   !! coarse part of B d
@@ -77,16 +78,15 @@ contains
       type(coarse_level_type), intent(in) :: coarse      !! with the means of the residual
       real(dp), intent(in) :: open_cells                 !! their number
       real(dp), intent(inout) :: form                    !! r.M r
-      real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1), shift
+      real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1)
       integer :: j
 
       do j = coarse%held(1), coarse%held(2)
          rows(1, j) = sum(coarse%mean(:, j))
       end do
       total = coarse%cells*coarse%block_totals(rows)
-      shift = total(1)/(of_open_cell*max(1.0_dp, open_cells))
-      self%pending(:, :) = self%pending + shift
-      form = form + shift*total(1)
+      self%shift = total(1)/(of_open_cell*max(1.0_dp, open_cells))
+      form = form + self%shift*total(1)
    end subroutine shift_mean
 
    !> Compute the coarse part of the image of the residual, and its contribution to the sums. Collective.
@@ -98,6 +98,7 @@ contains
       real(dp) :: rows(2, coarse%held(1):coarse%held(2)), totals(2)
       integer :: j
 
+      self%shift = 0.0_dp
       call self%model%add_missing(coarse%cells, coarse%mean, self%pending)
       !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
       do j = coarse%held(1), coarse%held(2)

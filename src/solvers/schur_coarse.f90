@@ -44,6 +44,7 @@ module schur_coarse
       real(dp), private :: blocks = 1.0_dp               !! number of blocks
       logical, private :: shared = .false.               !! other processes hold the other rows of blocks
       integer, private :: threads = 1
+      real(dp), allocatable, private :: powers(:)        !! w for each number of cells of N in a block, from 0
       real(dp), allocatable, private :: weight(:, :)     !! w of each block, [blocks along x, rows]
       type(convolution_type), private :: missing         !! the part of B that the stencil lacks
       type(row_column_type), private :: transform        !! for W
@@ -73,12 +74,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(transform_shape_type) :: shape
       real(dp), allocatable :: symbol(:, :)
-      integer :: own(2), modes(2)
+      integer :: own(2), modes(2), most, k
 
       shape = shape_of_rows(blocks_x, sharing, 1)
       self%shared = shape%shared
       self%blocks = real(shape%nx, dp)*shape%ny
       self%cells = grid%cells()/self%blocks
+      most = (grid%nx/shape%nx + 1)*(grid%ny/shape%ny + 1)
+      allocate (self%powers(0:most), source=[((k/self%cells)**power, k=0, most)])
       self%threads = merge(1, threads, self%blocks < 16384.0_dp)
       allocate (self%weight(shape%nx, shape%rows()), source=0.0_dp)
       call new_symbol_operator(self%missing, shape, error, single=.true.)
@@ -156,7 +159,7 @@ contains
 
       !$omp parallel do default(none) shared(self, cells_off) private(j) num_threads(self%threads)
       do j = 1, size(cells_off, 2)
-         self%weight(:, j) = (cells_off(:, j)/self%cells)**power
+         self%weight(:, j) = self%powers(nint(cells_off(:, j)))
       end do
       ! The shift is rounded, so that the symbol seldom has to be computed again. Numbers of cells are added
       ! without error.

@@ -22,7 +22,7 @@ module schur_passes
    implicit none
    private
 
-   public :: residual_pass, schur_fields_type, search_pass, step_type
+   public :: add_blocks, residual_pass, schur_fields_type, search_pass, step_type
 
    !> The fields of the preconditioner and its stencil.
    type :: schur_fields_type

@@ -33,12 +33,13 @@ module schur_preconditioner
    use active_blocks, only : active_blocks_type
    use coarse_level, only : coarse_level_type
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, sp
+   use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use row_halo, only : new_rim_halo
    use schur_blocks, only : new_schur_blocks
    use schur_coarse, only : om, stencil_c1
    use schur_passes, only : residual_pass, schur_fields_type, search_pass, step_type
+   use schur_release, only : release_pass, trial_type
    use schur_sweeps, only : response_sums_type
    use wave_preconditioner, only : new_wave_preconditioner, wave_preconditioner_type
    implicit none
@@ -46,22 +47,23 @@ module schur_preconditioner
 
    public :: new_schur_preconditioner, schur_preconditioner_type
 
-   real(dp), parameter :: c0_extended = 0.7_dp !! constant of the stencil (module `schur_coarse`)
-   real(dp), parameter :: c0_plain = 1.0_dp    !! the same if the residual is not extended
-   real(dp), parameter :: least_cells = 131072.0_dp   !! cells from which the extension saves time ...
-   real(dp), parameter :: least_oblong = 4096.0_dp    !! ... if they are oblong
-   real(dp), parameter :: oblong = 2.0_dp             !! aspect of an oblong cell
+   real(dp), parameter :: c0 = 0.7_dp          !! constant of the stencil (module `schur_coarse`)
+   real(dp), parameter :: typical = 3.2_dp     !! model over wave number per cell, between its least and its largest value
    real(dp), parameter :: solved = 1e-8_dp     !! reduction of the residual on N that is enough
 
    !> The preconditioner with its fields. A variable of this type must not be copied.
    type, extends(schur_fields_type) :: schur_preconditioner_type
-      logical :: extends = .false.                       !! the residual is extended by steps on N
       logical :: by_waves = .false.                      !! cells are so oblong that M r comes from `waves`
+      logical :: released = .false.                      !! the fields hold the change after a release
+      real(dp) :: compliance = 0.0_dp                    !! typical eigenvalue of M A, m/Pa
+      real(dp), private :: form = 0.0_dp                 !! r.M r
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
       type(wave_preconditioner_type) :: waves
    contains
       procedure :: set_residual
       procedure :: extend
+      procedure :: release
+      procedure :: correction
       procedure :: transforms
       procedure :: destroy
    end type schur_preconditioner_type
@@ -70,26 +72,21 @@ contains
 
    !> Make the preconditioner of a grid. The image and the response lie in `memory` for a field of doubles, which others
    !> may use from the last use of a direction until `set_residual`.
-   subroutine new_schur_preconditioner(self, grid, coarse, threads, memory, error, extends)
+   subroutine new_schur_preconditioner(self, grid, coarse, threads, memory, error)
       type(schur_preconditioner_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
       type(c_ptr), intent(in) :: memory
       type(error_type), allocatable, intent(out) :: error
-      logical, intent(in), optional :: extends           !! chosen by the grid if absent
       real(sp), pointer, contiguous :: pair(:, :, :)
-      real(dp) :: wx, wy, c0, aspect
+      real(dp) :: wx, wy
 
       self%grid = grid
       call new_rim_halo(self%rim, grid)
       self%threads = threads
-      aspect = max(grid%dx/grid%dy, grid%dy/grid%dx)
       self%by_waves = grid%very_oblong()
-      self%extends = min(grid%nx, grid%ny) > 1 .and. .not. self%by_waves &
-         .and. grid%cells() >= merge(least_oblong, least_cells, aspect > oblong)
-      if (present(extends)) self%extends = extends
-      c0 = merge(c0_extended, c0_plain, self%extends)
+      self%compliance = typical*pi*coarse%kernel%compliance(pi/coarse%h)
       wx = merge(0.0_dp, stencil_c1*coarse%h/grid%dx, grid%nx == 1)
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
@@ -127,13 +124,10 @@ contains
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: steps
       real(dp), intent(out) :: form                      !! r.M r = v.B v
-      type(step_type) :: step
-      type(response_sums_type) :: sums, parts
       real(dp) :: square                                 !! of the residual on N, which is -b
-      real(dp) :: product, before, first, length
-      integer :: k
 
       self%length = 0.0_sp
+      self%released = .false.
       if (self%by_waves) then
          call self%waves%apply(coarse, self%residual, self%search, self%image, self%blocks%pending, form, &
             self%overlap)
@@ -141,8 +135,44 @@ contains
       end if
       call self%blocks%image_parts(coarse, form, square)
       form = self%sums%form + form
-      if (steps == 0 .or. .not. self%extends) return
-      square = self%sums%square + square
+      call minimise(self, coarse, active, steps, self%sums%square + square, form)
+      self%form = form
+   end subroutine extend
+
+   !> Release the cells whose trial pressure is negative (module `schur_release`), and extend the residual to them by some
+   !> steps. Afterwards `image`, `response` and the coarse part hold the change of the direction. Collective.
+   subroutine release(self, coarse, active, steps, trial, pressure, direction)
+      class(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: steps
+      type(trial_type), intent(in) :: trial
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
+      real(sp), intent(in) :: direction(self%grid%nx, self%grid%rows())
+      real(dp) :: form
+
+      call release_pass(self, coarse, active, trial, pressure, direction)
+      self%blocks%shift = 0.0_dp
+      self%released = .true.
+      form = self%form
+      call minimise(self, coarse, active, steps, self%sums%square, form)
+   end subroutine release
+
+   !> Reduce v.B v by some steps of conjugate gradients on N. Collective.
+   subroutine minimise(self, coarse, active, steps, square_before, form)
+      class(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: steps
+      real(dp), intent(in) :: square_before              !! b^2 on N
+      real(dp), intent(inout) :: form                    !! v.B v
+      type(step_type) :: step
+      type(response_sums_type) :: sums, parts
+      real(dp) :: square, product, before, first, length
+      integer :: k
+
+      square = square_before
+      if (steps == 0 .or. square <= 0.0_dp) return
       call self%blocks%start(coarse)
       before = 0.0_dp
       first = 0.0_dp
@@ -169,7 +199,17 @@ contains
          ! Single precision cannot resolve smaller gains: further directions would be round-off.
          if (length*product <= epsilon(1.0_sp)*form) exit
       end do
-   end subroutine extend
+   end subroutine minimise
+
+   !> The coarse part of M r, or of the change after a release, along a row of blocks.
+   pure function correction(self, coarse, jb) result(row)
+      class(schur_preconditioner_type), intent(in) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: jb                          !! row of blocks
+      real(sp) :: row(self%grid%nx)
+
+      row = real(self%blocks%pending(coarse%block_x, jb) + self%blocks%shift, sp)
+   end function correction
 
    !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)

@@ -1,0 +1,124 @@
+!> Releases the cells from the contact in which a step would make the pressure negative, so that module
+!> `schur_preconditioner` can take the effect on the other cells into account.
+!>
+!> A trial pressure P + alpha d that becomes negative is set to 0. If nothing else were done, the pressure that was to
+!> balance the negative values beside it would be too large: at the edges of the contact the step then raises the energy
+!> that it should lower. The cells R with a negative trial pressure therefore get the step -P, and the model says what the
+!> other cells do: v is extended to R as well, where B v is now given. In the units of the direction d = M r,
+!>     minimise v.B v on N and R with (d + change)/alpha = -P on R,
+!> which conjugate gradients do from the present v. Their residual on R is the negative trial pressure over alpha.
+!> Afterwards the image holds the change of the direction on the rest of the contact.
+module schur_release
+   use active_blocks, only : active_blocks_type
+   use asperity_precision, only : dp, sp
+   use coarse_level, only : coarse_level_type
+   use field_sums, only : row_total
+   use schur_passes, only : add_blocks, schur_fields_type
+   implicit none
+   private
+
+   public :: release_pass, trial_type
+
+   !> The trial pressure P + alpha (d - offset).
+   type :: trial_type
+      real(dp) :: alpha = 0.0_dp
+      real(dp) :: offset = 0.0_dp
+   end type trial_type
+
+contains
+
+   !> Move the cells with a negative trial pressure from S to N: their residual becomes 0, and the image is what the model
+   !> has to remove. The image of the other cells of S becomes 0. Cells of S whose pressure is 0, and which the
+   !> direction would pull, are released as well.
+   subroutine release_pass(self, coarse, active, trial, pressure, direction)
+      class(schur_fields_type), intent(inout), target :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      type(trial_type), intent(in) :: trial
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
+      real(sp), intent(in) :: direction(self%grid%nx, self%grid%rows())
+      real(sp), allocatable :: column(:), count(:), correction(:)
+      real(sp), pointer, contiguous :: response(:)
+      real(dp), allocatable :: squares(:)
+      integer :: j, k, jb
+
+      allocate (squares(self%grid%rows()), source=0.0_dp)
+      !$omp parallel default(none) shared(self, coarse, active, trial, pressure, direction, squares) &
+      !$omp private(j, k, jb, column, count, correction, response) num_threads(self%threads)
+      allocate (column(self%grid%nx), count(self%grid%nx), correction(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = coarse%strips(1), coarse%strips(2)
+         correction(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
+         column(:) = 0.0_sp
+         count(:) = 0.0_sp
+         do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+            ! The response is not set where the length is 0.
+            response => self%image(:, j)
+            if (self%length > 0.0_sp) response => self%response(:, j)
+            do k = 1, active%wide_runs(jb)
+               associate (a => active%wide_first(k, jb), b => active%wide_last(k, jb))
+                  call release_cells(b - a + 1, trial, self%length, response(a:b), correction(a:b), pressure(a:b, j), &
+                     direction(a:b, j), self%residual(a:b, j), self%image(a:b, j), column(a:b), count(a:b), squares(j))
+               end associate
+            end do
+         end do
+         self%blocks%image_off(:, jb) = 0.0_dp
+         self%blocks%cells_off(:, jb) = 0.0_dp
+         call add_blocks(coarse, column, self%blocks%image_off(:, jb))
+         call add_blocks(coarse, count, self%blocks%cells_off(:, jb))
+      end do
+      !$omp end parallel
+      call coarse%share_blocks(self%blocks%image_off)
+      call coarse%share_blocks(self%blocks%cells_off)
+      self%sums%square = row_total(squares)
+      self%blocks%pending(:, :) = 0.0_dp
+      self%length = 0.0_sp
+   end subroutine release_pass
+
+   !> Release the cells of a part of a row, with the sums on N. One loop without branches, like those of module
+   !> `schur_sweeps`.
+   pure subroutine release_cells(n, trial, length, response, correction, pressure, direction, residual, image, column, &
+      count, squares)
+      integer, intent(in) :: n
+      type(trial_type), intent(in) :: trial
+      real(sp), intent(in) :: length
+      real(sp), intent(in) :: response(n), correction(n)   !! M r = image + length response + correction
+      real(dp), intent(in) :: pressure(n)
+      real(sp), intent(in) :: direction(n)
+      real(sp), intent(inout) :: residual(n)
+      real(sp), intent(inout) :: image(n)
+      real(sp), intent(inout) :: column(n)          !! sums of the image on N over the rows of a block
+      real(sp), intent(inout) :: count(n)           !! numbers of cells in N likewise
+      real(dp), intent(inout) :: squares            !! sum of the squares of the image on N
+      real(dp) :: per_alpha
+      real(sp) :: b, value, off, acts, released, square
+      integer :: i
+
+      per_alpha = 1.0_dp/trial%alpha
+      square = 0.0_sp
+      !$omp simd reduction(+:square) private(b, value, off, acts, released)
+      do i = 1, n
+         b = image(i) + length*response(i) + correction(i)
+         off = 1.0_sp - not_zero(residual(i))
+         acts = not_zero(direction(i))
+         value = acts*real(per_alpha*pressure(i) + (direction(i) - trial%offset), sp) + (1.0_sp - acts)*b
+         released = (1.0_sp - off)*(0.5_sp - sign(0.5_sp, value))
+         b = off*b + released*value
+         residual(i) = (1.0_sp - released)*residual(i)
+         image(i) = b
+         column(i) = column(i) + b
+         count(i) = count(i) + (off + released)
+         square = square + b*b
+      end do
+      squares = squares + square
+   end subroutine release_cells
+
+   !> 1 if a value is not 0 and 0 otherwise, without a branch.
+   elemental function not_zero(value)
+      real(sp), intent(in) :: value
+      real(sp) :: not_zero
+
+      not_zero = 0.5_sp + sign(0.5_sp, abs(value) - tiny(1.0_sp))
+   end function not_zero
+
+end module schur_release
