@@ -130,7 +130,7 @@ contains
       call check_order(d, '>=', 0.1_dp, 'past: it changes the pressure')
    end subroutine a_given_past_counts
 
-   !> On a road without waves shorter than 16 cells, the start saves a seventh of the transforms or more.
+   !> On a road without waves shorter than 16 cells, the start saves a tenth of the transforms or more.
    subroutine it_saves_transforms()
       type(grid_type) :: grid
       type(normal_problem_type) :: problem
@@ -142,7 +142,7 @@ contains
       call run_from(.false., grid, problem, height, s)
       call run_from(.true., grid, problem, height, t)
       call check_that(s%outcome%converged .and. t%outcome%converged, 'saving: '//t%outcome%reason)
-      call check_order(int(7*t%outcome%ffts), '<=', int(6*s%outcome%ffts), &
+      call check_order(int(10*t%outcome%ffts), '<=', int(9*s%outcome%ffts), &
          'saving: '//to_text(int(t%outcome%ffts))//' transforms instead of '//to_text(int(s%outcome%ffts)))
    end subroutine it_saves_transforms
 

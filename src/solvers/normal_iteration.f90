@@ -8,9 +8,11 @@
 !>
 !> The eigenvalues of M A lie within a factor of two, whatever the contact and the grid, so that one value of alpha fits
 !> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
-!> a step that did not lower the energy is alpha smaller, by the factor kappa. Along directions of another kind
-!> (those of very oblong cells, and plain ones), alpha comes from a prediction of d.A d on the block means, which the
-!> ratio kappa of the last true product to its prediction corrects.
+!> a step that did not lower the energy is alpha smaller, by the factor kappa.
+!>
+!> There are directions of another kind: plain ones, those of very oblong cells, and those at a given approach on a periodic
+!> grid, where M lacks the soft response of the mean pressure. No cells are released for them, and alpha comes from a
+!> prediction of d.A d on the block means, which the ratio kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
@@ -27,7 +29,7 @@ module normal_iteration
    use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type
-   use regular_grid, only : boundary_periodic
+   use regular_grid, only : boundary_periodic, grid_type
    use schur_release, only : trial_type
    implicit none
    private
@@ -50,9 +52,16 @@ module normal_iteration
 
    ! Steps by which the preconditioner extends the residual before and after the release of cells, for the numbers of cells
    ! of a grid from which they save time.
-   real(dp), parameter :: medium = 1e5_dp, large = 1.5e6_dp, huge_grid = 3e7_dp
-   integer, parameter :: steps_before(4) = [1, 1, 3, 3]
-   integer, parameter :: steps_after(4) = [2, 3, 4, 6]
+   real(dp), parameter :: large = 1.5e6_dp
+   real(dp), parameter :: sizes(4) = [2e4_dp, 1e5_dp, large, 3e7_dp]
+   real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
+   integer, parameter :: class_of_oblong = 2
+   integer, parameter :: steps_before(0:4) = [1, 1, 1, 3, 3]
+   integer, parameter :: steps_after(0:4) = [1, 2, 3, 4, 6]
+   ! The same if no cells are released, for few and for many cells in contact: the gaps between many are narrow, and the
+   ! coarse level does not resolve them.
+   integer, parameter :: steps_alone(0:4, 2) = reshape([0, 0, 2, 2, 2, 0, 0, 3, 4, 4], [5, 2])
+   real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells from which they are many
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
@@ -61,6 +70,7 @@ module normal_iteration
    !> The numbers that an iteration passes to the next one.
    type :: iteration_type
       integer :: phase = phase_restart
+      logical :: releases = .false.         !! the cells with a negative trial pressure are released
       real(dp) :: kappa = 1.0_dp            !! by which trials are shorter than the model says
       real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
       real(dp) :: slope = 0.0_dp            !! r.d
@@ -86,11 +96,12 @@ contains
       far_rim_pays = cells >= large
    end function far_rim_pays
 
-   !> The place of a grid in `steps_before` and `steps_after`.
-   pure integer function size_class(cells)
-      real(dp), intent(in) :: cells                    !! of the grid
+   !> The place of a grid in the lists of steps. The stencil fits oblong cells less well, so that they need more steps.
+   pure integer function size_class(grid)
+      type(grid_type), intent(in) :: grid
 
-      size_class = 1 + count(cells >= [medium, large, huge_grid])
+      size_class = count(grid%cells() >= sizes)
+      if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong) size_class = max(size_class, class_of_oblong)
    end function size_class
 
    !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
@@ -102,13 +113,18 @@ contains
       real(dp), contiguous, intent(inout) :: before(:, :)  !! work field, for the residual before
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta
+      integer :: steps
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load
-      call work%preconditioner%extend(work%coarse, work%active, steps_before(size_class(work%grid%cells())), rz)
+      now%releases = .not. work%preconditioner%by_waves &
+         .and. (fixed_load .or. work%grid%boundary /= boundary_periodic)
+      steps = size_class(work%grid)
+      steps = merge(steps_before(steps), steps_alone(steps, merge(2, 1, measure%contact > much_contact)), now%releases)
+      call work%preconditioner%extend(work%coarse, work%active, steps, rz)
       if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
          call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
       beta = 0.0_dp
@@ -180,8 +196,8 @@ contains
       if (now%phase == phase_ended) return
       fixed_load = task%control == control_pressure
       alpha = trial_length(work, task%modulus, now)
-      if (fits_model(work, now)) call work%preconditioner%release(work%coarse, work%active, &
-         steps_after(size_class(work%grid%cells())), trial_type(alpha, work%offset), pressure, work%direction)
+      if (fits_model(now)) call work%preconditioner%release(work%coarse, work%active, &
+         steps_after(size_class(work%grid)), trial_type(alpha, work%offset), pressure, work%direction)
       call try_pressure(work, alpha, pressure, step, trial)
       if (trial%cells < 1.0_dp .and. fixed_load) then
          call shorten(now)
@@ -199,12 +215,11 @@ contains
       end if
    end subroutine choose_step
 
-   !> Is the direction M r + beta d with the M of the local model?
-   pure logical function fits_model(work, now)
-      type(normal_work_type), intent(in) :: work
+   !> Is the direction one for which M A has eigenvalues within a factor of two?
+   pure logical function fits_model(now)
       type(iteration_type), intent(in) :: now
 
-      fits_model = now%phase == phase_conjugate .and. .not. work%preconditioner%by_waves
+      fits_model = now%phase == phase_conjugate .and. now%releases
    end function fits_model
 
    !> The multiple alpha of the direction for the trial pressure.
@@ -214,7 +229,7 @@ contains
       type(iteration_type), intent(in) :: now
       real(dp) :: alpha
 
-      if (fits_model(work, now)) then
+      if (fits_model(now)) then
          alpha = modulus/(max(now%kappa, 1.0_dp)*work%preconditioner%compliance*work%scale)
       else
          alpha = now%slope*modulus/max(now%kappa*predict_form(work), tiny(1.0_dp))
@@ -252,7 +267,7 @@ contains
          return
       end if
       before = now%kappa
-      if (fits_model(work, now)) then
+      if (fits_model(now)) then
          now%kappa = max(before/shortening, 1.0_dp)
       else
          predicted = work%coarse%predict_form(sums%square)/modulus
