@@ -10,9 +10,10 @@
 !> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
-!> There are directions of another kind: plain ones, those of very oblong cells, and those at a given approach on a periodic
-!> grid, where M lacks the soft response of the mean pressure. No cells are released for them, and alpha comes from a
-!> prediction of d.A d on the block means, which the ratio kappa of the last true product to its prediction corrects.
+!> There are directions of another kind: plain ones, those of very oblong cells, those on a free strip of few cells across,
+!> whose compliance is not that of a half-space, and those at a given approach on a periodic grid, where M lacks the soft
+!> response of the mean pressure. No cells are released for them, and alpha comes from a prediction of d.A d on the block
+!> means, which the ratio kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
@@ -62,6 +63,7 @@ module normal_iteration
    ! coarse level does not resolve them.
    integer, parameter :: steps_alone(0:4, 2) = reshape([0, 0, 2, 2, 2, 0, 0, 3, 4, 4], [5, 2])
    real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells from which they are many
+   integer, parameter :: least_across = 8         !! cells across a free strip for which the model fits
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
@@ -120,8 +122,7 @@ contains
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load
-      now%releases = .not. work%preconditioner%by_waves &
-         .and. (fixed_load .or. work%grid%boundary /= boundary_periodic)
+      now%releases = model_fits(work, fixed_load)
       steps = size_class(work%grid)
       steps = merge(steps_before(steps), steps_alone(steps, merge(2, 1, measure%contact > much_contact)), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
@@ -215,7 +216,21 @@ contains
       end if
    end subroutine choose_step
 
-   !> Is the direction one for which M A has eigenvalues within a factor of two?
+   !> Do the eigenvalues of M A lie within a factor of two?
+   pure logical function model_fits(work, fixed_load)
+      type(normal_work_type), intent(in) :: work
+      logical, intent(in) :: fixed_load
+
+      associate (grid => work%grid)
+         if (grid%boundary == boundary_periodic) then
+            model_fits = fixed_load .and. .not. work%preconditioner%by_waves
+         else
+            model_fits = min(grid%nx, grid%ny) >= least_across .and. .not. work%preconditioner%by_waves
+         end if
+      end associate
+   end function model_fits
+
+   !> Is the direction one for which the eigenvalues of M A lie within a factor of two?
    pure logical function fits_model(now)
       type(iteration_type), intent(in) :: now
 
