@@ -136,7 +136,8 @@ contains
       real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()], Pa
       integer, intent(in) :: threads
       real(dp), intent(out) :: pressure(:, :)      !! [fine%nx, fine%rows()], Pa
-      real(dp), allocatable :: rows(:, :), between(:)
+      real(dp), allocatable :: rows(:, :), between(:), parts(:)
+      integer, allocatable :: beside(:, :)
       real(dp) :: part
       integer :: range(2), j, below
 
@@ -145,40 +146,50 @@ contains
          below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
       allocate (rows(coarse%nx, range(2) - range(1) + 1))
       call fetch_rows(coarse, values, range, rows)
+      call places_along_row(coarse, fine%nx, beside, parts)
 
-      !$omp parallel default(none) shared(coarse, fine, rows, range, pressure) private(j, below, part, between) &
+      !$omp parallel default(none) shared(coarse, fine, rows, range, pressure, beside, parts) private(j, below, part, between) &
       !$omp num_threads(threads)
-      allocate (between(coarse%nx))
+      allocate (between(0:coarse%nx), source=0.0_dp)
       !$omp do
       do j = 1, fine%rows()
          associate (row => fine%first_row - 1 + j)
             below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
             part = part_above(fine%ny, coarse%ny, row)
          end associate
-         between(:) = interpolate(part, rows(:, below - 1), rows(:, below), rows(:, below + 1), rows(:, below + 2))
-         call refine_row(coarse, between, pressure(:, j))
+         between(1:) = interpolate(part, rows(:, below - 1), rows(:, below), rows(:, below + 1), rows(:, below + 2))
+         call refine_row(between, beside, parts, pressure(:, j))
       end do
       !$omp end parallel
    end subroutine refine_pressure
 
-   !> Interpolate the pressure of a row.
-   pure subroutine refine_row(coarse, values, pressure)
+   !> Find the four coarse cells beside the centre of each cell of a row, 0 for those outside a free grid, and how far the
+   !> centre lies from the second towards the third.
+   subroutine places_along_row(coarse, cells, beside, parts)
       type(grid_type), intent(in) :: coarse
-      real(dp), intent(in) :: values(:)            !! [coarse%nx], Pa
-      real(dp), intent(out) :: pressure(:)         !! Pa
-      real(dp) :: beside(-1:2)
-      integer :: i, k, below
+      integer, intent(in) :: cells                 !! of the row
+      integer, allocatable, intent(out) :: beside(:, :)   !! [4, cells]
+      real(dp), allocatable, intent(out) :: parts(:)      !! [cells]
+      integer :: i, k
+
+      allocate (beside(4, cells), parts(cells))
+      do i = 1, cells
+         beside(:, i) = coarse%column_at(below_centre(cells, coarse%nx, i) + [(k, k=-1, 2)])
+         parts(i) = part_above(cells, coarse%nx, i)
+      end do
+   end subroutine places_along_row
+
+   !> Interpolate the pressure of a row.
+   pure subroutine refine_row(values, beside, parts, pressure)
+      real(dp), intent(in) :: values(0:)           !! [0:coarse%nx], 0 at 0, Pa
+      integer, intent(in) :: beside(:, :)          !! [4, cells], as `places_along_row` gives it
+      real(dp), intent(in) :: parts(:)             !! [cells], likewise
+      real(dp), intent(out) :: pressure(:)         !! [cells], Pa
+      integer :: i
 
       do i = 1, size(pressure)
-         below = below_centre(size(pressure), coarse%nx, i)
-         beside = 0.0_dp
-         do k = -1, 2
-            associate (column => coarse%column_at(below + k))
-               if (column > 0) beside(k) = values(column)
-            end associate
-         end do
-         pressure(i) = interpolate(part_above(size(pressure), coarse%nx, i), &
-            beside(-1), beside(0), beside(1), beside(2))
+         pressure(i) = interpolate(parts(i), values(beside(1, i)), values(beside(2, i)), values(beside(3, i)), &
+            values(beside(4, i)))
       end do
    end subroutine refine_row
 
@@ -191,7 +202,7 @@ contains
       real(dp) :: nearest
 
       value = 0.0_dp
-      nearest = merge(below, above, nint(part) == 0)
+      nearest = merge(below, above, part < 0.5_dp)
       if (nearest <= 0.0_dp) return
       value = (1.0_dp - part)*below + part*above &
          - part*(1.0_dp - part)*((2.0_dp - part)*(before - 2.0_dp*below + above) &

@@ -9,14 +9,16 @@
 !>   conjugacy of the directions);
 !> * a preconditioner whose symbol is about |q|, with the wave number q; it consists of a local stencil and block means,
 !>   and the residual is extended outside the contact for it (module `schur_preconditioner`);
-!> * a prediction of the step length from the block means, so that the projected step s is known before the transform,
-!>   and an iteration always takes two transforms;
+!> * cells in which the step would make the pressure negative are released from the contact before the step, and the
+!>   step of the other cells takes this into account (module `schur_release`);
+!> * a step length that the preconditioner knows, so that the projected step s is known before the transform, and an
+!>   iteration always takes two transforms;
 !> * passes over active blocks of 16 cells only, except the one that updates the gap.
 !> The method of the thesis (2.1.2) is in module `normal_cg_thesis`.
 !>
-!> An iteration measures the error, chooses a direction d, projects P + alpha d on the admissible pressures, which
-!> gives a step s, and adds the multiple of s to P that minimises the energy. Module `normal_iteration` chooses the
-!> direction and the step.
+!> An iteration measures the error, chooses a direction d, releases the cells in which P + alpha d is negative, projects
+!> P + alpha d on the admissible pressures, which gives a step s, and adds the multiple of s to P that minimises the
+!> energy. Module `normal_iteration` chooses the direction and the step.
 !>
 !> On a large grid, a solve without a given start first solves the same problem roughly on about a quarter of the cells
 !> along each side, whose means of the height are a smoother road, and starts from that pressure (nested iteration).
@@ -33,7 +35,7 @@
 !> Memory, in fields of doubles: 7.1 in periodic mode. These are H, P, gap and step; three fields in single precision
 !> (the direction, the residual and the search direction of the preconditioner); the operator's spectrum, whose memory
 !> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
-!> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
+!> a quarter for the operator's symbol (three eighths in mixed precision); and 0.4 for blocks and the coarse level. In free
 !> mode spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more
 !> until it is found.
 module normal_cg
@@ -96,7 +98,7 @@ contains
       self%grid = grid
       if (present(mixed)) self%mixed = mixed
       allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
-      call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
+      call new_convolution(self%operator, grid, kernel, error)
       if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
          memory=self%operator%spectrum_memory())
       if (.not. allocated(error)) call new_normal_work(self%work, self%operator, error)

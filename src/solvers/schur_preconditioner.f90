@@ -22,8 +22,9 @@
 !> proportional to the inverse squares, like those of a Laplacian, they would be far too large along the short side of
 !> oblong cells.
 !>
-!> On small grids of nearly square cells the extension saves no time: there M r = B_SS r. In all other cases it halves
-!> the iterations. For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
+!> The same conjugate gradients continue from v after some cells were moved from S to N (module `schur_release`).
+!>
+!> For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
 !> rim around the contact (the wide blocks of module `active_blocks`). Memory: four such fields, of which two lie in memory
