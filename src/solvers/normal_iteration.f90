@@ -56,7 +56,7 @@ module normal_iteration
    real(dp), parameter :: large = 1.5e6_dp
    real(dp), parameter :: sizes(4) = [2e4_dp, 1e5_dp, large, 3e7_dp]
    real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
-   integer, parameter :: class_of_oblong = 2
+   integer, parameter :: least_class = 2          !! of oblong cells and line contacts
    integer, parameter :: steps_before(0:4) = [1, 1, 1, 3, 3]
    integer, parameter :: steps_after(0:4) = [1, 2, 3, 4, 6]
    ! The same if no cells are released, for few and for many cells in contact: the gaps between many are narrow, and the
@@ -98,12 +98,14 @@ contains
       far_rim_pays = cells >= large
    end function far_rim_pays
 
-   !> The place of a grid in the lists of steps. The stencil fits oblong cells less well, so that they need more steps.
+   !> The place of a grid in the lists of steps. The stencil fits oblong cells less well, and a line contact has many cells
+   !> along its only direction: they need more steps.
    pure integer function size_class(grid)
       type(grid_type), intent(in) :: grid
 
       size_class = count(grid%cells() >= sizes)
-      if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong) size_class = max(size_class, class_of_oblong)
+      if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong .or. min(grid%nx, grid%ny) == 1) &
+         size_class = max(size_class, least_class)
    end function size_class
 
    !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
