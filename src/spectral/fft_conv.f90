@@ -52,7 +52,7 @@ module fft_conv
       logical :: shared = .false.           !! processes share the rows
       type(grid_type) :: grid               !! of an operator of a solid
       type(kernel_type) :: kernel           !! what the solid is
-      type(symbol_table_type) :: symbols 
+      type(symbol_table_type) :: symbols
       type(row_column_double_type), private :: high        !! does the work if not single
       type(row_column_single_type), private :: low         !! does the work if single
    contains
