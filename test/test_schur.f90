@@ -62,32 +62,44 @@ contains
       end if
    end subroutine run_schur
 
+   !> Make a preconditioner, and its model B as a dense matrix.
+   subroutine new_setting(s, grid, b)
+      type(setting_type), intent(out), target :: s
+      type(grid_type), intent(in) :: grid
+      real(dp), allocatable, intent(out) :: b(:, :)
+      type(error_type), allocatable :: error
+      real(dp) :: unit(grid%nx*grid%ny), form
+      integer :: i
+
+      s%grid = grid
+      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
+      call check_no_error(error, 'a coarse level')
+      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
+      allocate (s%memory(grid%nx, grid%ny))
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
+      call check_no_error(error, 'a preconditioner')
+      allocate (b(size(unit), size(unit)))
+      do i = 1, size(unit)
+         unit(:) = 0.0_dp
+         unit(i) = 1.0_dp
+         call apply(s, unit, abs(unit) > 0.0_dp, 0, b(:, i), form)
+      end do
+   end subroutine new_setting
+
    !> M r is the Schur complement of the model, which is a dense matrix on a small grid.
    subroutine preconditioner_is_the_schur_complement(boundary, nx, ny, aspect)
       integer, intent(in) :: boundary, nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx
       type(setting_type), target :: s
-      type(error_type), allocatable :: error
-      real(dp), allocatable :: b(:, :), unit(:), r(:), z(:), exact(:), found(:)
+      real(dp), allocatable :: b(:, :), r(:), z(:), exact(:), found(:)
       logical, allocatable :: inside(:)
       integer, allocatable :: on(:), off(:)
       real(dp) :: form, before
       integer :: i, n, steps
 
-      s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
-      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
-      call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
-      allocate (s%memory(nx, ny))
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
-      call check_no_error(error, 'a preconditioner')
+      call new_setting(s, new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary), b)
       n = nx*ny
-      allocate (b(n, n), unit(n), r(n), z(n))
-      do i = 1, n
-         unit(:) = 0.0_dp
-         unit(i) = 1.0_dp
-         call apply(s, unit, abs(unit) > 0.0_dp, 0, b(:, i), form)
-      end do
+      allocate (z(n))
       call check_order(maxval(abs(b - transpose(b))), '<=', 1e-6_dp*maxval(abs(b)), &
          'the model is symmetric')
       inside = [(modulo(7*i*i + 3*i, 11) < 5, i=1, n)]
@@ -119,28 +131,16 @@ contains
       integer, intent(in) :: boundary, nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx
       type(setting_type), target :: s
-      type(error_type), allocatable :: error
       type(trial_type) :: trial
-      real(dp), allocatable :: b(:, :), unit(:), r(:), z(:), wanted(:), v(:), exact(:), found(:)
+      real(dp), allocatable :: b(:, :), r(:), z(:), wanted(:), v(:), exact(:), found(:)
       logical, allocatable :: inside(:), released(:)
       integer, allocatable :: on(:), off(:)
       real(dp) :: form
       integer :: i, n
 
-      s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
-      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
-      call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
-      allocate (s%memory(nx, ny))
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
-      call check_no_error(error, 'a preconditioner')
+      call new_setting(s, new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary), b)
       n = nx*ny
-      allocate (b(n, n), unit(n), r(n), z(n))
-      do i = 1, n
-         unit(:) = 0.0_dp
-         unit(i) = 1.0_dp
-         call apply(s, unit, abs(unit) > 0.0_dp, 0, b(:, i), form)
-      end do
+      allocate (z(n))
 
       inside = [(modulo(7*i*i + 3*i, 11) < 7, i=1, n)]
       r = merge([(sin(1.7_dp*i) + 0.3_dp, i=1, n)], 0.0_dp, inside)

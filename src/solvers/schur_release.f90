@@ -1,13 +1,13 @@
 !> Releases the cells from the contact in which a step would make the pressure negative, so that module
 !> `schur_preconditioner` can take the effect on the other cells into account.
 !>
-!> A trial pressure P + alpha d that becomes negative is set to 0. If nothing else were done, the pressure that was to
-!> balance the negative values beside it would be too large: at the edges of the contact the step then raises the energy
-!> that it should lower. The cells R with a negative trial pressure therefore get the step -P, and the model says what the
-!> other cells do: v is extended to R as well, where B v is now given. In the units of the direction d = M r,
-!>     minimise v.B v on N and R with (d + change)/alpha = -P on R,
-!> which conjugate gradients do from the present v. Their residual on R is the negative trial pressure over alpha.
-!> Afterwards the image holds the change of the direction on the rest of the contact.
+!> The trial pressure is P + alpha (d - offset). If it were only set to 0 in the cells R where it is negative, the pressure
+!> beside them, which balances the negative values, would be too large: at the edges of the contact the step would
+!> raise the energy. The cells R therefore get the step -P, and the model determines the change of the direction d in
+!> the other cells: v remains r on the rest of S, and on N and R it is chosen such that
+!>     B (change of v) = -B v on N,   alpha (d + B (change of v) - offset) = -P on R.
+!> Conjugate gradients continue from the present v. Their residual on R is minus the trial pressure over alpha, and that
+!> on N is -B v. Afterwards the image holds the change of the direction on the rest of the contact.
 module schur_release
    use active_blocks, only : active_blocks_type
    use asperity_precision, only : dp, sp
