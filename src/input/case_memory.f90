@@ -118,7 +118,7 @@ contains
       real(dp) :: fields
       real(dp), parameter :: spectrum(2) = [1.0_dp, 2.0_dp]          ! periodic, free
       real(dp), parameter :: symbol(2) = [0.25_dp, 1.0_dp]
-      real(dp), parameter :: symbols_mixed(2) = [0.375_dp, 1.5_dp]
+      real(dp), parameter :: symbols_mixed(2) = [0.125_dp, 1.5_dp]
       integer :: kind
 
       kind = merge(2, 1, case%grid%boundary == boundary_free)

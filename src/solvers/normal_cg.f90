@@ -35,7 +35,7 @@
 !> Memory, in fields of doubles: 7.1 in periodic mode. These are H, P, gap and step; three fields in single precision
 !> (the direction, the residual and the search direction of the preconditioner); the operator's spectrum, whose memory
 !> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
-!> a quarter for the operator's symbol (three eighths in mixed precision); and 0.4 for blocks and the coarse level. In free
+!> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
 !> mode spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more
 !> until it is found.
 module normal_cg
@@ -98,7 +98,7 @@ contains
       self%grid = grid
       if (present(mixed)) self%mixed = mixed
       allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
-      call new_convolution(self%operator, grid, kernel, error)
+      call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
       if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
          memory=self%operator%spectrum_memory())
       if (.not. allocated(error)) call new_normal_work(self%work, self%operator, error)

@@ -199,7 +199,7 @@ contains
       if (now%phase == phase_ended) return
       fixed_load = task%control == control_pressure
       alpha = trial_length(work, task%modulus, now)
-      if (fits_model(now)) call work%preconditioner%release(work%coarse, work%active, &
+      if (is_releasing(now)) call work%preconditioner%release(work%coarse, work%active, &
          steps_after(size_class(work%grid)), trial_type(alpha, work%offset), pressure, work%direction)
       call try_pressure(work, alpha, pressure, step, trial)
       if (trial%cells < 1.0_dp .and. fixed_load) then
@@ -232,12 +232,12 @@ contains
       end associate
    end function model_fits
 
-   !> Is the direction one for which the eigenvalues of M A lie within a factor of two?
-   pure logical function fits_model(now)
+   !> Does this iteration release cells? Not if its direction is a plain one.
+   pure logical function is_releasing(now)
       type(iteration_type), intent(in) :: now
 
-      fits_model = now%phase == phase_conjugate .and. now%releases
-   end function fits_model
+      is_releasing = now%phase == phase_conjugate .and. now%releases
+   end function is_releasing
 
    !> The multiple alpha of the direction for the trial pressure.
    function trial_length(work, modulus, now) result(alpha)
@@ -246,7 +246,7 @@ contains
       type(iteration_type), intent(in) :: now
       real(dp) :: alpha
 
-      if (fits_model(now)) then
+      if (is_releasing(now)) then
          alpha = modulus/(max(now%kappa, 1.0_dp)*work%preconditioner%compliance*work%scale)
       else
          alpha = now%slope*modulus/max(now%kappa*predict_form(work), tiny(1.0_dp))
@@ -284,7 +284,7 @@ contains
          return
       end if
       before = now%kappa
-      if (fits_model(now)) then
+      if (is_releasing(now)) then
          now%kappa = max(before/shortening, 1.0_dp)
       else
          predicted = work%coarse%predict_form(sums%square)/modulus

@@ -12,10 +12,12 @@
 !> Memory: one field (two for a vector operator), doubled along x in free mode, and a quarter of a
 !> field (a whole one in free mode) for each symbol. An operator made with `single` takes half of that,
 !> works in single precision, and is used in the same way. Operators that are never in use at the same time can
-!> share the memory of their spectra (`spectrum_memory`).
+!> share the memory of their spectra (`spectrum_memory`). A periodic operator of a solid made with
+!> `lean` has no table of its symbol: it computes the symbol in every product, which takes longer.
 module fft_conv
    use, intrinsic :: iso_c_binding, only : c_ptr
    use asperity_errors, only : error_input, error_type, fail
+   use computed_symbol, only : columns_computed
    use kernels, only : kernel_type
    use asperity_threads, only : thread_count
    use asperity_precision, only : dp, int64, power_of_two
@@ -52,7 +54,7 @@ module fft_conv
       logical :: shared = .false.           !! processes share the rows
       type(grid_type) :: grid               !! of an operator of a solid
       type(kernel_type) :: kernel           !! what the solid is
-      type(symbol_table_type) :: symbols
+      type(symbol_table_type) :: symbols    !! no values if lean
       type(row_column_double_type), private :: high        !! does the work if not single
       type(row_column_single_type), private :: low         !! does the work if single
    contains
@@ -75,14 +77,16 @@ module fft_conv
 contains
 
    !> The operator of a solid of unit shear modulus, m/Pa.
-   subroutine new_convolution(self, grid, kernel, error, single, memory, sharing)
+   subroutine new_convolution(self, grid, kernel, error, single, memory, lean, sharing)
       type(convolution_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
       logical, intent(in), optional :: single      !! work in single precision
       type(c_ptr), intent(in), optional :: memory  !! of another operator, never in use at the same time
+      logical, intent(in), optional :: lean        !! no table of the symbol, where that is possible
       type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
+      logical :: tabulated
 
       if (.not. allocated(error) .and. grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) &
          call fail(error, error_input, 'this solid is for periodic boundaries only')
@@ -90,6 +94,10 @@ contains
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
+      tabulated = .true.
+      if (present(lean)) tabulated = .not. lean
+      if (grid%boundary /= boundary_periodic .or. kernel%components > 1 .or. self%single) tabulated = .true.
+      if (.not. tabulated) return
       call self%symbols%make_room()
       associate (table => self%symbols)
          call kernel%symbols(grid, self%mx, self%my, table%values(table%first:table%last, :, :), table%first)
@@ -331,6 +339,8 @@ contains
       self%ffts = self%ffts + merge(2, 1, back)*self%components
       if (self%single) then
          call self%low%columns(self%symbols%low_values, self%symbols%unit, inverse, back, form)
+      else if (.not. allocated(self%symbols%values)) then
+         call columns_computed(self%high, self%grid, self%kernel, inverse, form)
       else
          call self%high%columns(self%symbols%values, self%symbols%unit, inverse, back, form)
       end if
