@@ -43,6 +43,7 @@ module adhesion_cg_fast
    use adhesion_symbols, only : adhesion_symbols_type
    use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
+   use adhesion_window, only : new_adhesion_window
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type, fresh, updated
    use asperity_errors, only : error_type
    use kernels, only : kernel_type
@@ -85,6 +86,7 @@ contains
       associate (work => self%work)
          call new_adhesion_patch(work%patch, grid, kernel, symbols, error)
          if (allocated(error)) return
+         call new_adhesion_window(work%window, grid, kernel)
          associate (mx => work%patch%mx, rows => work%patch%all_rows)
             call new_adhesion_model(work%model, mx, work%patch%sharing, symbols, work%patch%stiffness%modes(), &
                work%patch%nyquist, error)

@@ -13,6 +13,9 @@
 !> on free grids, because the closed cells may be a large part of the contact, and the missing part of their
 !> product, far away, adds up in the level; and after steps that failed.
 !>
+!> Where the attraction closes or opens a gap, a small spot has not arrived at the end of a step. Unless the length of an
+!> iteration was limited, such spots are then relaxed in small windows (module `adhesion_spots`).
+!>
 !> If the attraction is strong, the energy has many minima, and a long step can leap over the minimum at which a
 !> slow motion would stop. Therefore no iteration changes g + z_0 of a cell by more than a fraction of it: the
 !> attraction then changes little, and the cells that have come into contact resist before their neighbours
@@ -24,6 +27,7 @@ module adhesion_descent
    use adhesion_potential, only : has_smooth_potential
    use adhesion_state, only : control_approach
    use adhesion_residual, only : measure
+   use adhesion_spots, only : relax_spots
    use adhesion_steps, only : stepped_gap, sum_shift
    use adhesion_sweeps, only : move_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
@@ -38,6 +42,7 @@ module adhesion_descent
    integer, parameter :: most_iterations = 8          !! in the model, for a step
    real(dp), parameter :: goal = 0.1_dp               !! part of the residual at which a step ends
    real(dp), parameter :: largest_change = 0.7_dp     !! of g + z_0 in an iteration, relative to g + z_0
+   real(dp), parameter :: narrow = 0.1_dp             !! gap/z_0, and its ratio to G in its unit, that count as narrow
    real(dp), parameter :: change_at_jump = 100.0_dp   !! the same if the attraction jumps
    real(dp), parameter :: least_stiffness = 0.25_dp   !! least part of s.B_h s that counts, whatever the attraction
 
@@ -71,13 +76,18 @@ contains
       largest = largest_change/4**min(now%caution, 10)
       ! If steps were small, a jump of the attraction would stop every cell that arrives at it.
       if (.not. has_smooth_potential(now%problem%potential)) largest = change_at_jump/4**min(now%caution, 10)
+      if (now%failures > 0 .and. .not. keeps_sum(work, now)) call close_narrow_gaps(work, inner)
       do k = 1, most
-         if (k > 1) call measure(work, inner)
+         if (k > 1 .or. abs(inner%pending) > 0.0_dp) call measure(work, inner)
          if (k > 1 .and. inner%residual <= goal*now%residual) exit
          call find_direction(work, inner)
          if (.not. inner%slope > 0.0_dp) exit
          call descend(work, inner, largest)
       end do
+      if (now%caution == 0 .and. .not. (inner%length_limited .or. keeps_sum(work, now))) then
+         if (k > most) call measure(work, inner)
+         if (inner%residual > goal*now%residual) call relax_spots(work, goal*now%residual, inner)
+      end if
       !$omp parallel do default(none) shared(work, now, inner) private(j) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
          work%direction(:, j) = inner%state(:, j) - now%state(:, j)
@@ -86,13 +96,53 @@ contains
       now%length_limited = inner%length_limited
    end subroutine approach_minimum
 
+   !> Is the sum of the gaps prescribed?
+   pure logical function keeps_sum(work, now)
+      type(adhesion_work_type), intent(in) :: work
+      type(adhesion_iteration_type), intent(in) :: now
+
+      keeps_sum = work%patch%periodic .and. now%problem%control == control_approach
+   end function keeps_sum
+
+   !> Close the gaps that are narrow and about to close anyway. After a step of which only a part was taken, many gaps may
+   !> be so narrow that the next step closes them at once. The direction would point downhill mainly in these cells, and
+   !> uphill without them.
+   subroutine close_narrow_gaps(work, inner)
+      type(adhesion_work_type), intent(inout) :: work
+      type(adhesion_iteration_type), intent(inout) :: inner
+      real(dp) :: form
+      logical :: any_closed
+      integer :: j, n
+
+      any_closed = .false.
+      !$omp parallel do default(none) shared(work, inner) private(j, n) reduction(.or.: any_closed) &
+      !$omp num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         n = work%patch%inner(j)
+         work%change(:, j) = 0.0_dp
+         associate (gap => inner%state(1:n, j)/inner%units%length, &
+            gradient => -work%residual(1:n, j)/inner%units%traction)
+            where (gap <= narrow .and. gap <= narrow*gradient) work%change(1:n, j) = -inner%state(1:n, j)
+         end associate
+         inner%state(1:n, j) = inner%state(1:n, j) + work%change(1:n, j)
+         any_closed = any_closed .or. any(work%change(1:n, j) < 0.0_dp)
+      end do
+      if (.not. any_process(any_closed)) return
+      !$omp parallel do default(none) shared(work) private(j) num_threads(work%patch%threads)
+      do j = 1, work%patch%all_rows
+         call work%model%put_row(j, work%change(:, j))
+      end do
+      call form_product(work, form)
+      inner%pending = inner%problem%modulus
+   end subroutine close_narrow_gaps
+
    !> Do an iteration in the model: move along the direction by the length that its curvature predicts.
    subroutine descend(work, inner, largest)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
       real(dp), intent(in) :: largest                  !! change of g + z_0, relative to g + z_0
       real(dp) :: alpha, form, shift, stiffness
-      logical :: clipped, keeps_sum, whole
+      logical :: clipped, whole
 
       call form_product(work, form)
       form = inner%problem%modulus*form
@@ -104,10 +154,9 @@ contains
          inner%length_limited = .true.
       end if
       shift = 0.0_dp
-      keeps_sum = work%patch%periodic .and. inner%problem%control == control_approach
-      whole = keeps_sum .or. inner%caution > 0 .or. .not. work%patch%periodic &
+      whole = keeps_sum(work, inner) .or. inner%caution > 0 .or. .not. work%patch%periodic &
          .or. .not. has_smooth_potential(inner%problem%potential)
-      if (keeps_sum) shift = sum_shift(inner%state, work%direction, alpha, inner%gap_sum, work%patch%threads)
+      if (keeps_sum(work, inner)) shift = sum_shift(inner%state, work%direction, alpha, inner%gap_sum, work%patch%threads)
       call move(work, inner, alpha, shift, whole, clipped)
       inner%level = inner%level + alpha*inner%lift
       inner%pending = inner%problem%modulus*alpha

@@ -3,6 +3,7 @@
 module adhesion_work
    use adhesion_model, only : adhesion_model_type
    use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type
+   use adhesion_window, only : adhesion_window_type
    use asperity_precision, only : dp
    implicit none
    private
@@ -17,6 +18,7 @@ module adhesion_work
    type :: adhesion_work_type
       type(adhesion_patch_type) :: patch
       type(adhesion_model_type) :: model
+      type(adhesion_window_type) :: window
       !> Input and output of the preconditioner M: the scaled residual, then z = M r. Between its uses, G or e'.
       real(dp), allocatable :: exchange(:, :)
       real(dp), allocatable :: residual(:, :)        !! r
