@@ -7,6 +7,7 @@ program main
    use test_adhesion_cg, only : run_adhesion_cg
    use test_adhesion_free, only : run_adhesion_free
    use test_adhesion_potential, only : run_adhesion_potential
+   use test_adhesion_spots, only : run_adhesion_spots
    use test_base, only : run_base
    use test_block_motion, only : run_block_motion
    use test_case_input, only : run_case_input
@@ -106,6 +107,7 @@ program main
          suite_type('normal_invariance', run_normal_invariance), &
          suite_type('schur', run_schur), &
          suite_type('adhesion_free', run_adhesion_free), &
+         suite_type('adhesion_spots', run_adhesion_spots), &
          suite_type('facade', run_facade)])
    call end_processes()
 

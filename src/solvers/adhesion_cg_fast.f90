@@ -12,6 +12,7 @@
 !>
 !> (modules `adhesion_residual`, `adhesion_descent`, `adhesion_plane` and `adhesion_steps`).
 !>
+!> * `approach_minimum` also relaxes the spots that are farthest from equilibrium (module `adhesion_spots`).
 !> * The product B s is exact, and so is the energy along s. The energy never rises. An iteration takes two transforms,
 !>   and those of the model, on a grid with an eighth of the cells in each direction.
 !> * For square cells, B_h is between 0.8 and 1.3 times B. A step therefore leaves about a quarter of the residual.
