@@ -53,6 +53,13 @@ CASES = {
     "&surface shape = 'paraboloid', radius = 1e-3 /\n&material shear_modulus = 1e6 /\n"
     "&adhesion potential = 'exponential', energy = 0.05, range = 0.5e-6 /\n"
     "&phase displacement = 0.5e-6 /\n&phase displacement = -0.2e-6 /\n",
+    # The grid is large enough for the windows of the spots that are far from equilibrium.
+    "adhesion in spots": "&grid nx = 256, ny = 210, lx = 384e-9, ly = 315e-9 /\n"
+    "&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 96e-9,\n"
+    "   wavelength_short = 20e-9, rms_slope = 1., seed = 1 /\n"
+    "&material shear_modulus = 6.25e6 /\n"
+    "&adhesion potential = 'exponential', energy = 0.05, range = 2.071e-9 /\n"
+    "&phase pressure = 1.25e6 /\n",
     "friction": ROUGH.format(boundary="periodic")
     + VISCOELASTIC.replace(" /", ", thickness = 2e-3, density = 1000. /")
     + "&friction law = 'coulomb', coefficient = 0.3 /\n"
