@@ -10,10 +10,9 @@
 !> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
-!> There are directions of another kind: plain ones, those of very oblong cells, those on a free strip of few cells across,
-!> whose compliance is not that of a half-space, and those at a given approach on a periodic grid, where M lacks the soft
-!> response of the mean pressure. No cells are released for them, and alpha comes from a prediction of d.A d on the block
-!> means, which the ratio kappa of the last true product to its prediction corrects.
+!> There are directions of another kind: plain ones, those of very oblong cells, and those on a free strip of few cells
+!> across, whose compliance is not that of a half-space. No cells are released for them, and alpha comes from a prediction
+!> of d.A d on the block means, which the ratio kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
@@ -59,15 +58,10 @@ module normal_iteration
    integer, parameter :: least_class = 2          !! of oblong cells and line contacts
    integer, parameter :: steps_before(0:4) = [1, 1, 1, 3, 3]
    integer, parameter :: steps_after(0:4) = [1, 2, 3, 4, 6]
-   ! The same if no cells are released, for few and for many cells in contact: the gaps between many are narrow, and the
-   ! coarse level does not resolve them.
-   integer, parameter :: steps_alone(0:4, 2) = reshape([0, 0, 2, 2, 2, 0, 0, 3, 4, 4], [5, 2])
-   real(dp), parameter :: much_contact = 0.3_dp   !! part of the cells from which they are many
+   integer, parameter :: steps_alone(0:4) = [0, 0, 2, 2, 2]   !! if no cells are released
    integer, parameter :: least_across = 8         !! cells across a free strip for which the model fits
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
-
-   real(dp), parameter :: most_contact = 0.5_dp   !! part of the cells in contact from which `shift_mean` is needed
 
    !> The numbers that an iteration passes to the next one.
    type :: iteration_type
@@ -121,15 +115,18 @@ contains
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
+      if (fixed_load .or. work%grid%boundary /= boundary_periodic) then
+         call work%preconditioner%blocks%stiffen_mean()
+      else
+         call work%preconditioner%blocks%stiffen_mean(1.0_dp - measure%contact)
+      end if
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load
-      now%releases = model_fits(work, fixed_load)
+      now%releases = model_fits(work)
       steps = size_class(work%grid)
-      steps = merge(steps_before(steps), steps_alone(steps, merge(2, 1, measure%contact > much_contact)), now%releases)
+      steps = merge(steps_before(steps), steps_alone(steps), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
-      if (.not. fixed_load .and. mostly_touches(work, measure%contact)) &
-         call work%preconditioner%blocks%shift_mean(work%coarse, work%grid%cells()*(1.0_dp - measure%contact), rz)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, before, rz, now%rz)
       now%rz = rz
@@ -168,16 +165,6 @@ contains
       end if
       beta = max(rz - overlap, 0.0_dp)/rz_before
    end function conjugacy_factor
-
-   !> Do so many cells touch that the mean pressure at a given approach depends on the few open ones? Module
-   !> `wave_preconditioner` takes care of that itself.
-   pure logical function mostly_touches(work, contact)
-      type(normal_work_type), intent(in) :: work
-      real(dp), intent(in) :: contact                  !! part of the cells
-
-      mostly_touches = work%grid%boundary == boundary_periodic .and. .not. work%preconditioner%by_waves &
-         .and. contact > most_contact
-   end function mostly_touches
 
    !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
    !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
@@ -219,17 +206,12 @@ contains
    end subroutine choose_step
 
    !> Do the eigenvalues of M A lie within a factor of two?
-   pure logical function model_fits(work, fixed_load)
+   pure logical function model_fits(work)
       type(normal_work_type), intent(in) :: work
-      logical, intent(in) :: fixed_load
 
-      associate (grid => work%grid)
-         if (grid%boundary == boundary_periodic) then
-            model_fits = fixed_load .and. .not. work%preconditioner%by_waves
-         else
-            model_fits = min(grid%nx, grid%ny) >= least_across .and. .not. work%preconditioner%by_waves
-         end if
-      end associate
+      model_fits = .not. work%preconditioner%by_waves
+      if (work%grid%boundary /= boundary_periodic) &
+         model_fits = model_fits .and. min(work%grid%nx, work%grid%ny) >= least_across
    end function model_fits
 
    !> Does this iteration release cells? Not if its direction is a plain one.

@@ -19,8 +19,9 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
-   !> Compliance of an open cell that is surrounded by cells in contact, in the units of the model.
-   real(dp), parameter :: of_open_cell = 1.0_dp
+   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
+   !> inverse compliance of an open cell that is surrounded by cells in contact.
+   real(dp), parameter :: of_open_cells = 2.0_dp
 
    integer, parameter :: small = 16384         !! blocks below which one thread is faster
 
@@ -28,7 +29,8 @@ module schur_blocks
    type :: schur_blocks_type
       type(schur_coarse_type) :: model            !! the coarse part of the model
       integer, private :: threads = 1
-      real(dp) :: shift = 0.0_dp                  !! part of M r that is the same in all cells (`shift_mean`)
+      real(dp), private :: mean_stiffness = 0.0_dp   !! that the model adds for the mean of v over the grid
+      real(dp), private :: cells = 1.0_dp            !! of the grid
       real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
       real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
       real(dp), allocatable, private :: addition(:, :)   !! coarse part of B d
@@ -38,8 +40,8 @@ module schur_blocks
       real(dp), allocatable :: response_off(:, :)   !! K d
       real(dp), allocatable, private :: search_off(:, :)   !! d
    contains
+      procedure :: stiffen_mean
       procedure :: image_parts
-      procedure :: shift_mean
       procedure :: start
       procedure :: weigh
       procedure :: form_direction
@@ -59,6 +61,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < small)
+      self%cells = grid%cells()
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
          allocate (self%pending(nx, first:last), self%correction(nx, first:last), source=0.0_dp)
          allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
@@ -68,26 +71,38 @@ contains
       call new_schur_coarse(self%model, grid, c0, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
 
-   !> Add to M r the part that the model lacks at a given approach. If the pressure of all cells in contact changes by the
-   !> same amount, only the gaps of the open cells change, because the mean displacement is part of the approach. So
-   !>     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell),
-   !> and M r lacks 1_S (1_S.r)/(1_S.A 1_S): near full contact a much larger change of the mean pressure than the model
-   !> gives. Collective.
-   subroutine shift_mean(self, coarse, open_cells, form)
+   !> Make the mean of v stiff or, if there is no part of open cells, leave it as it is.
+   !>
+   !> At a given approach on a periodic grid the mean displacement is given, so that B is infinite for the mean: v should
+   !> have none. If the pressure of all cells in contact changes by the same amount, only the gaps of the open cells change,
+   !>     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell).
+   !> A finite stiffness of about the inverse of that, over the number of all cells, is therefore sufficient.
+   subroutine stiffen_mean(self, open_part)
       class(schur_blocks_type), intent(inout) :: self
-      type(coarse_level_type), intent(in) :: coarse      !! with the means of the residual
-      real(dp), intent(in) :: open_cells                 !! their number
-      real(dp), intent(inout) :: form                    !! r.M r
+      real(dp), intent(in), optional :: open_part        !! of the cells
+
+      self%mean_stiffness = 0.0_dp
+      if (present(open_part)) self%mean_stiffness = of_open_cells/max(open_part, 1.0_dp/self%cells)
+   end subroutine stiffen_mean
+
+   !> Compute the coarse part of B from the sums of a field over the blocks. Collective.
+   subroutine add_coarse(self, coarse, factor, sums, addition)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(in) :: factor
+      real(dp), intent(in) :: sums(:, coarse%held(1):)       !! over this factor
+      real(dp), intent(inout) :: addition(:, coarse%held(1):)
       real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1)
       integer :: j
 
+      call self%model%add_missing(factor, sums, addition)
+      if (.not. self%mean_stiffness > 0.0_dp) return
       do j = coarse%held(1), coarse%held(2)
-         rows(1, j) = sum(coarse%mean(:, j))
+         rows(1, j) = sum(sums(:, j))
       end do
-      total = coarse%cells*coarse%block_totals(rows)
-      self%shift = total(1)/(of_open_cell*max(1.0_dp, open_cells))
-      form = form + self%shift*total(1)
-   end subroutine shift_mean
+      total = coarse%block_totals(rows)
+      addition(:, :) = addition + self%mean_stiffness*factor*total(1)/self%cells
+   end subroutine add_coarse
 
    !> Compute the coarse part of the image of the residual, and its contribution to the sums. Collective.
    subroutine image_parts(self, coarse, form, square)
@@ -98,8 +113,7 @@ contains
       real(dp) :: rows(2, coarse%held(1):coarse%held(2)), totals(2)
       integer :: j
 
-      self%shift = 0.0_dp
-      call self%model%add_missing(coarse%cells, coarse%mean, self%pending)
+      call add_coarse(self, coarse, coarse%cells, coarse%mean, self%pending)
       !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
       do j = coarse%held(1), coarse%held(2)
          rows(1, j) = sum(coarse%mean(:, j)*self%pending(:, j))
@@ -122,7 +136,7 @@ contains
          self%image_off(:, j) = self%image_off(:, j) + self%pending(:, j)*self%cells_off(:, j)
          self%search_off(:, j) = 0.0_dp
       end do
-      call self%model%set_weights(self%cells_off)
+      call self%model%set_weights(self%cells_off, self%mean_stiffness)
    end subroutine start
 
    !> Compute the coarse part of W applied to -b. Collective.
@@ -154,7 +168,7 @@ contains
          self%search_off(:, j) = self%correction(:, j)*self%cells_off(:, j) - om*self%image_off(:, j) &
             + beta*self%search_off(:, j)
       end do
-      call self%model%add_missing(1.0_dp, self%search_off, self%addition)
+      call add_coarse(self, coarse, 1.0_dp, self%search_off, self%addition)
    end subroutine form_direction
 
    !> Compute the contribution of the coarse part of the response to the sums. From here on b includes the step

@@ -151,9 +151,10 @@ contains
    end subroutine add_missing
 
    !> Prepare W for a set N. Collective.
-   subroutine set_weights(self, cells_off)
+   subroutine set_weights(self, cells_off, mean_stiffness)
       class(schur_coarse_type), intent(inout) :: self
       real(dp), intent(in) :: cells_off(:, :)          !! numbers of cells of N in the blocks
+      real(dp), intent(in) :: mean_stiffness           !! that B has for the mean in addition
       real(dp) :: taken, shift, all_off(1)
       integer :: i, j
 
@@ -166,15 +167,28 @@ contains
       all_off = sum(cells_off)
       if (self%shared) all_off = global_sum(all_off)
       taken = nint(32.0_dp*(1.0_dp - all_off(1)/(self%cells*self%blocks)))/32.0_dp
-      if (abs(taken - self%taken) <= 0.0_dp) return
-      self%taken = taken
       shift = least_shift + contact_shift*taken
-      do j = 0, ubound(self%model, 2)
-         do i = lbound(self%model, 1), ubound(self%model, 1)
-            self%symbol(i, j, 1) = real(max(1.0_dp/(self%model(i, j) + shift) - om, 0.0_dp)/self%blocks, sp)
+      if (abs(taken - self%taken) > 0.0_dp) then
+         self%taken = taken
+         do j = 0, ubound(self%model, 2)
+            do i = lbound(self%model, 1), ubound(self%model, 1)
+               self%symbol(i, j, 1) = weight_of(self, self%model(i, j) + shift)
+            end do
          end do
-      end do
+      end if
+      ! The mean belongs to the process that has the first wave numbers along x.
+      if (lbound(self%model, 1) == 0 .and. size(self%model, 1) > 0) &
+         self%symbol(0, 0, 1) = weight_of(self, self%model(0, 0) + mean_stiffness + shift)
    end subroutine set_weights
+
+   !> The symbol of the coarse part of W for a stiffness of B, with the factor of the transforms.
+   pure function weight_of(self, stiffness) result(weight)
+      class(schur_coarse_type), intent(in) :: self
+      real(dp), intent(in) :: stiffness
+      real(sp) :: weight
+
+      weight = real(max(1.0_dp/stiffness - om, 0.0_dp)/self%blocks, sp)
+   end function weight_of
 
    !> Compute the coarse part of W p from the sums of p over the cells of N in the blocks. Collective.
    subroutine weigh(self, factor, sums, correction)

@@ -22,6 +22,8 @@
 !> proportional to the inverse squares, like those of a Laplacian, they would be far too large along the short side of
 !> oblong cells.
 !>
+!> At a given approach on a periodic grid the mean of v is stiff in the model (`stiffen_mean` of module `schur_blocks`).
+!>
 !> The same conjugate gradients continue from v after some cells were moved from S to N (module `schur_release`).
 !>
 !> For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
@@ -153,7 +155,6 @@ contains
       real(dp) :: form
 
       call release_pass(self, coarse, active, trial, pressure, direction)
-      self%blocks%shift = 0.0_dp
       self%released = .true.
       form = self%form
       call minimise(self, coarse, active, steps, self%sums%square, form)
@@ -209,7 +210,7 @@ contains
       integer, intent(in) :: jb                          !! row of blocks
       real(sp) :: row(self%grid%nx)
 
-      row = real(self%blocks%pending(coarse%block_x, jb) + self%blocks%shift, sp)
+      row = real(self%blocks%pending(coarse%block_x, jb), sp)
    end function correction
 
    !> Transforms done so far, in units of a transform of the whole grid.
