@@ -13,8 +13,8 @@
 !> on free grids, because the closed cells may be a large part of the contact, and the missing part of their
 !> product, far away, adds up in the level; and after steps that failed.
 !>
-!> Where the attraction closes or opens a gap, a small spot has not arrived at the end of a step. Unless the length of an
-!> iteration was limited, such spots are then relaxed in small windows (module `adhesion_spots`).
+!> Small spots where the attraction closes or opens a gap may still be far from equilibrium when a step ends. Unless the
+!> length of an iteration was limited, they are then relaxed in small windows (module `adhesion_spots`).
 !>
 !> If the attraction is strong, the energy has many minima, and a long step can leap over the minimum at which a
 !> slow motion would stop. Therefore no iteration changes g + z_0 of a cell by more than a fraction of it: the
@@ -27,9 +27,10 @@ module adhesion_descent
    use adhesion_potential, only : has_smooth_potential
    use adhesion_state, only : control_approach
    use adhesion_residual, only : measure
-   use adhesion_spots, only : relax_spots
+   use adhesion_spots, only : may_have_spots, relax_spots
    use adhesion_steps, only : stepped_gap, sum_shift
    use adhesion_sweeps, only : move_cells
+   use adhesion_window, only : largest_change, least_stiffness
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
@@ -41,10 +42,8 @@ module adhesion_descent
 
    integer, parameter :: most_iterations = 8          !! in the model, for a step
    real(dp), parameter :: goal = 0.1_dp               !! part of the residual at which a step ends
-   real(dp), parameter :: largest_change = 0.7_dp     !! of g + z_0 in an iteration, relative to g + z_0
-   real(dp), parameter :: narrow = 0.1_dp             !! gap/z_0, and its ratio to G in its unit, that count as narrow
+   real(dp), parameter :: narrow = 0.1_dp             !! a narrow gap is at most this part of z_0, and of z_0 G/(unit of G)
    real(dp), parameter :: change_at_jump = 100.0_dp   !! the same if the attraction jumps
-   real(dp), parameter :: least_stiffness = 0.25_dp   !! least part of s.B_h s that counts, whatever the attraction
 
 contains
 
@@ -84,7 +83,7 @@ contains
          if (.not. inner%slope > 0.0_dp) exit
          call descend(work, inner, largest)
       end do
-      if (now%caution == 0 .and. .not. (inner%length_limited .or. keeps_sum(work, now))) then
+      if (may_have_spots(work, now) .and. now%caution == 0 .and. .not. (inner%length_limited .or. keeps_sum(work, now))) then
          if (k > most) call measure(work, inner)
          if (inner%residual > goal*now%residual) call relax_spots(work, goal*now%residual, inner)
       end if

@@ -16,12 +16,28 @@ module adhesion_spots
    implicit none
    private
 
-   public :: relax_spots
+   public :: may_have_spots, relax_spots
 
    real(dp), parameter :: most_cells = 0.02_dp    !! part of the cells that may be in windows
    integer, parameter :: most_windows = 200
 
 contains
+
+   !> Are windows allowed? The road must be large enough, and the attraction may not jump.
+   pure logical function may_have_spots(work, now)
+      type(adhesion_work_type), intent(in) :: work
+      type(adhesion_iteration_type), intent(in) :: now
+
+      may_have_spots = windows_allowed(work) > 0 .and. min(work%patch%nx, rows_of_patch(work)) >= side &
+         .and. has_smooth_potential(now%problem%potential)
+   end function may_have_spots
+
+   !> The largest number of windows.
+   pure integer function windows_allowed(work)
+      type(adhesion_work_type), intent(in) :: work
+
+      windows_allowed = int(min(most_cells*work%patch%cells/side**2, real(most_windows, dp)))
+   end function windows_allowed
 
    !> Relax the spots whose natural residual exceeds a limit. `inner` has been measured. Only its gaps change, so that its
    !> traction is no longer theirs. Collective.
@@ -35,8 +51,6 @@ contains
       real(dp) :: rest
       integer :: k
 
-      if (.not. has_smooth_potential(inner%problem%potential)) return
-      if (min(work%patch%nx, rows_of_patch(work)) < side) return
       call find_spots(work, limit, inner, corners, rest)
       allocate (gap(side, side, size(corners, 2)), traction(side, side, size(corners, 2)), source=0.0_dp)
       call copy_windows(work, inner, corners, gap, traction)
@@ -45,8 +59,11 @@ contains
       !$omp parallel do default(none) shared(work, task, gap, traction) private(k) schedule(dynamic) &
       !$omp num_threads(work%patch%threads)
       do k = 1, size(gap, 3)
-         if (is_mine(work, k)) call work%window%relax(task, traction(:, :, k), gap(:, :, k))
-         if (.not. is_mine(work, k)) gap(:, :, k) = 0.0_dp
+         if (is_mine(work, k)) then
+            call work%window%relax(task, traction(:, :, k), gap(:, :, k))
+         else
+            gap(:, :, k) = 0.0_dp
+         end if
       end do
       if (work%patch%sharing%shared) gap = reshape(global_sum([gap]), shape(gap))
       call put_windows(work, corners, gap, inner)
@@ -84,9 +101,8 @@ contains
       integer, allocatable, intent(out) :: corners(:, :)   !! first cell and row of each window
       real(dp), intent(out) :: rest                        !! largest natural residual outside the windows
       real(dp), allocatable :: own(:, :), whole(:, :)      !! largest residual and its cell in each row
-      integer :: corner(2), before, j, most
+      integer :: corner(2), before, j
 
-      most = min(int(most_cells*work%patch%cells/side**2), most_windows)
       before = rows_before(work)
       allocate (corners(2, 0), own(2, work%patch%rows))
       !$omp parallel do default(none) shared(work, inner, corners, own, before) private(j) &
@@ -99,7 +115,7 @@ contains
          if (work%patch%sharing%shared) whole = gather_rows(own)
          j = maxloc(whole(1, :), dim=1)
          rest = whole(1, j)
-         if (rest <= limit .or. size(corners, 2) >= most) exit
+         if (rest <= limit .or. size(corners, 2) == windows_allowed(work)) exit
 
          ! A window that would reach beyond the road moves inwards.
          corner = [nint(whole(2, j)), j] - side/2

@@ -17,10 +17,11 @@ module adhesion_window
    implicit none
    private
 
-   public :: adhesion_window_type, new_adhesion_window, side, window_task_type
+   public :: adhesion_window_type, largest_change, least_stiffness, new_adhesion_window, side, window_task_type
 
    integer, parameter :: side = 32                    !! cells along a side of a window
    integer, parameter :: most_iterations = 100
+   ! The same hold for the model of the whole contact:
    real(dp), parameter :: largest_change = 0.7_dp     !! of g + z_0 in an iteration, relative to g + z_0
    real(dp), parameter :: least_stiffness = 0.25_dp   !! least part of d.B d that counts, whatever the attraction
 

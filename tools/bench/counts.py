@@ -44,6 +44,14 @@ WAVES = """
 &phase velocity_x = {speed}, duration = {duration}, steps = {steps} /
 &solver tolerance = 1e-5 /
 """
+ROUGH_ADHESION = """
+&grid nx = {n}, ny = {n}, lx = {lx} /
+&surface shape = 'self_affine', hurst = 0.8, rms_slope = 1.0, wavelength_long = {long},
+   wavelength_rolloff = {long}, wavelength_short = {short}, seed = 1 /
+&material shear_modulus = 6.25e6 /
+&adhesion potential = 'exponential', energy = 0.05, range = 2.071e-9 /
+&phase pressure = 1.25e6 /
+"""
 
 CASES = {
     "rough, light": SQUARE.format(n=256, short=16 / 256, pressure=0.0005),
@@ -52,7 +60,7 @@ CASES = {
     "rough, mixed": SQUARE.format(n=512, short=16 / 512, pressure=0.005)
     + "&solver precision = 'mixed' /",
     "rough, given approach": SQUARE.format(n=256, short=16 / 256, pressure=0.005).replace(
-        "pressure", "displacement").replace("0.005", "0.004"),
+        "pressure = 0.005", "displacement = 0.004"),
     "rough, oblong cells": "&grid nx = 256, ny = 96, lx = 1.0, ly = 1.0 /"
     + ROUGH.format(short=0.08, pressure=0.005),
     "rough, free": "&grid nx = 128, ny = 128, lx = 1.0, boundary = 'free' /"
@@ -93,22 +101,8 @@ CASES = {
 &adhesion potential = 'exponential', energy = 0.05, range = 60e-9 /
 &phase pressure = 0 /
 """,
-    "rough, adhesion": """
-&grid nx = 128, ny = 128, lx = 192e-9 /
-&surface shape = 'self_affine', hurst = 0.8, rms_slope = 1.0, wavelength_long = 48e-9,
-   wavelength_rolloff = 48e-9, wavelength_short = 19.5e-9, seed = 1 /
-&material shear_modulus = 6.25e6 /
-&adhesion potential = 'exponential', energy = 0.05, range = 2.071e-9 /
-&phase pressure = 1.25e6 /
-""",
-    "rough, adhesion in spots": """
-&grid nx = 512, ny = 512, lx = 768e-9 /
-&surface shape = 'self_affine', hurst = 0.8, rms_slope = 1.0, wavelength_long = 192e-9,
-   wavelength_rolloff = 192e-9, wavelength_short = 20e-9, seed = 1 /
-&material shear_modulus = 6.25e6 /
-&adhesion potential = 'exponential', energy = 0.05, range = 2.071e-9 /
-&phase pressure = 1.25e6 /
-""",
+    "rough, adhesion": ROUGH_ADHESION.format(n=128, lx=192e-9, long=48e-9, short=19.5e-9),
+    "rough, adhesion in spots": ROUGH_ADHESION.format(n=512, lx=768e-9, long=192e-9, short=20e-9),
     "steady sliding": """
 &grid nx = 64, ny = 64, lx = 1e-3 /
 &surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2, wavelength_long = 5e-4,
