@@ -182,8 +182,10 @@ contains
       blocks = size(self%live, 1)
       rows = size(self%wide_runs)
       allocate (holds(blocks, rows), stretched(blocks, rows))
-      holds(:, :) = .false.
-      do j = self%strips(1), self%strips(2)
+      !$omp parallel do default(none) shared(self, holds, rows) private(j, k) num_threads(self%threads)
+      do j = 1, rows
+         holds(:, j) = .false.
+         if (j < self%strips(1) .or. j > self%strips(2)) cycle
          do k = self%first_y(j), self%first_y(j + 1) - 1
             holds(:, j) = holds(:, j) .or. self%live(:, k)
          end do
@@ -191,12 +193,18 @@ contains
       ! The rim of a block may reach rows of other processes.
       holds(:, :) = on_any_process(holds)
       rim = merge(self%far_rim, self%rim, far)
+      !$omp parallel default(none) shared(self, holds, stretched, blocks, rows, rim) private(b, j) &
+      !$omp num_threads(self%threads)
+      !$omp do
       do j = 1, rows
          stretched(:, j) = dilated(holds(:, j), rim(1))
       end do
+      !$omp end do
+      !$omp do
       do b = 1, blocks
          holds(b, :) = dilated(stretched(b, :), rim(2))
       end do
+      !$omp end parallel
       !$omp parallel do default(none) shared(self, search, holds, blocks) &
       !$omp private(b, j, k, first, last, n, now, before) num_threads(self%threads)
       do j = self%strips(1), self%strips(2)
