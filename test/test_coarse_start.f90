@@ -28,6 +28,7 @@ contains
       if (selected('short_waves_survive')) call short_waves_survive()
       if (selected('a_given_past_counts')) call a_given_past_counts()
       if (selected('it_saves_transforms')) call it_saves_transforms()
+      if (selected('it_replaces_the_start_of_another_load')) call it_replaces_the_start_of_another_load()
       if (selected('not_where_it_cannot_help')) call not_where_it_cannot_help()
    end subroutine run_coarse_start
 
@@ -60,7 +61,7 @@ contains
    end subroutine short_waves_survive
 
    !> Solve with a start from a coarser grid, or without.
-   subroutine run_from(coarse, grid, problem, height, solution, mixed, past)
+   subroutine run_from(coarse, grid, problem, height, solution, mixed, past, start)
       logical, intent(in) :: coarse                    !! start from a coarser grid
       type(grid_type), intent(in) :: grid
       type(normal_problem_type), intent(in) :: problem
@@ -68,10 +69,12 @@ contains
       type(solution_type), intent(out) :: solution
       logical, intent(in), optional :: mixed           !! in mixed precision
       real(dp), intent(in), optional :: past(:, :)     !! P_h, Pa
+      real(dp), intent(in), optional :: start(:, :)    !! the pressure that is given if problem%warm, Pa
       type(normal_solver_type) :: solver
       type(error_type), allocatable :: error
 
       allocate (solution%pressure(grid%nx, grid%ny), solution%gap(grid%nx, grid%ny), source=0.0_dp)
+      if (present(start)) solution%pressure(:, :) = start
       call new_normal_solver(solver, grid, normal_half_space(poisson), error, mixed)
       call check_no_error(error, 'a solver')
       solver%coarse_start_from = merge(0.0_dp, huge(1.0_dp), coarse)
@@ -145,6 +148,40 @@ contains
       call check_order(int(10*t%outcome%ffts), '<=', int(9*s%outcome%ffts), &
          'saving: '//to_text(int(t%outcome%ffts))//' transforms instead of '//to_text(int(s%outcome%ffts)))
    end subroutine it_saves_transforms
+
+   !> A given pressure of a tenth of the load is replaced, which saves transforms. One of nearly the same load is kept, and
+   !> the solution is the same in any case.
+   subroutine it_replaces_the_start_of_another_load()
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: other, kept, replaced
+      real(dp), allocatable :: height(:, :)
+      real(dp), parameter :: loads(2) = [0.1_dp, 0.98_dp]
+      real(dp) :: d, full_load
+      integer :: k
+
+      grid = new_grid(512, 512, 1.0_dp, 1.0_dp, boundary_periodic)
+      call rough_problem(grid, 16.0_dp, 0.005_dp, problem, height)
+      full_load = problem%target
+      do k = 1, 2
+         problem%target = loads(k)*full_load
+         problem%warm = .false.
+         call run_from(.false., grid, problem, height, other)
+         problem%target = full_load
+         problem%warm = .true.
+         call run_from(.false., grid, problem, height, kept, start=other%pressure)
+         call run_from(.true., grid, problem, height, replaced, start=other%pressure)
+         call check_that(kept%outcome%converged .and. replaced%outcome%converged, 'another load: '//replaced%outcome%reason)
+         call distance(grid, problem%modulus, height, kept%pressure, replaced%pressure, d)
+         call check_order(d, '<=', 8.0_dp*problem%tolerance, 'another load: the same pressure')
+         if (k == 1) then
+            call check_order(int(10*replaced%outcome%ffts), '<=', int(9*kept%outcome%ffts), 'another load: ' &
+               //to_text(int(replaced%outcome%ffts))//' transforms instead of '//to_text(int(kept%outcome%ffts)))
+         else
+            call check_that(all(abs(kept%pressure - replaced%pressure) <= 0.0_dp), 'nearly the same load: the start is kept')
+         end if
+      end do
+   end subroutine it_replaces_the_start_of_another_load
 
    !> The ordinary start is used near full contact, where it is nearly the solution, and for a road whose cells are
    !> independent of each other, which a coarser grid cannot show.

@@ -20,8 +20,9 @@
 !> P + alpha d on the admissible pressures, which gives a step s, and adds the multiple of s to P that minimises the
 !> energy. Module `normal_iteration` chooses the direction and the step.
 !>
-!> On a large grid, a solve without a given start first solves the same problem roughly on about a quarter of the cells
-!> along each side, whose means of the height are a smoother road, and starts from that pressure (nested iteration).
+!> On a large grid, a solve without a given start, or with one for another load, first solves the same problem roughly on
+!> about a quarter of the cells along each side, whose means of the height are a smoother road, and starts from that
+!> pressure (nested iteration).
 !>
 !> The solve has converged if the duality gap e1 = (mean gap weighted by the pressure - least gap)/h_rms and the
 !> error of the load are below the tolerance. If the contact is small on a tall
@@ -69,6 +70,7 @@ module normal_cg
    real(dp), parameter :: least_roughness = 0.9_dp    !! rms height of the coarser road over that of the road
    real(dp), parameter :: rough_tolerance = 1e-2_dp   !! of its solution: the details belong to the finer grid
    integer, parameter :: most_rough_iterations = 30
+   real(dp), parameter :: far_load = 0.05_dp          !! change of the load for which a given start is no better
    real(dp), parameter :: nearly_full = 0.9_dp        !! contact area from which that of full contact is the better start
 
    !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
@@ -248,8 +250,8 @@ contains
 
    end subroutine solve
 
-   !> On a large grid, replace a missing start by the pressure of a rough solution on a coarser grid, if that is worth
-   !> the effort.
+   !> On a large grid, replace a start that is missing or far away by the pressure of a rough solution on a coarser grid, if
+   !> that is worth the effort.
    recursive subroutine start_on_coarse_grid(self, task, height, pressure, effort, past)
       class(normal_solver_type), intent(in) :: self
       type(normal_problem_type), intent(inout) :: task
@@ -262,8 +264,11 @@ contains
       logical :: useful
 
       effort = 0.0_dp
-      if (task%warm .or. self%grid%cells() < self%coarse_start_from) return
+      if (self%grid%cells() < self%coarse_start_from) return
       if (task%control == control_pressure .and. task%target <= 0.0_dp) return
+      if (task%warm .and. .not. is_far(task, pressure)) return
+      task%warm = .false.
+      task%displaced = .false.
       coarse = coarse_grid(self%grid)
       allocate (road(coarse%nx, coarse%rows()))
       call coarsen(self%grid, coarse, height, self%operator%threads, road)
@@ -278,8 +283,18 @@ contains
       if (.not. useful) return
       call refine_pressure(coarse, self%grid, rough, self%operator%threads, pressure)
       task%warm = .true.
-      task%displaced = .false.
    end subroutine start_on_coarse_grid
+
+   !> Would a start without the given one be better? If the load has changed much, it would. At a given approach the change
+   !> of the load is not known.
+   logical function is_far(task, pressure)
+      type(normal_problem_type), intent(in) :: task
+      real(dp), intent(in) :: pressure(:, :)               !! Pa
+
+      is_far = .false.
+      if (task%control == control_pressure) &
+         is_far = abs(field_mean(pressure) - task%target) > far_load*task%target
+   end function is_far
 
    !> Solve a problem roughly on a coarser grid.
    recursive subroutine solve_roughly(self, coarse, task, road, memory, pressure, effort, useful)
