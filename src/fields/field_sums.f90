@@ -318,6 +318,7 @@ contains
       integer :: j
 
       allocate (rows(size(condition, 2)))
+      !$omp parallel do default(none) shared(condition, rows) private(j)
       do j = 1, size(condition, 2)
          rows(j) = count(condition(:, j))
       end do

@@ -59,6 +59,7 @@ module coupled_passes
    use contact_model, only : contact_mean, contact_type, solve_normal
    use coupling_mismatch, only : mismatch_of
    use asperity_interpolation, only : displaced
+   use field_copies, only : copy_field
    use friction_law, only : contact_open
    use edge_shares, only : edge_rule_type, new_edge_rule
    use joint_step, only : joint_step_type
@@ -155,7 +156,7 @@ contains
          contact%stop%given_up = stop_is_due()
          if (contact%stop%given_up) return
          call control%judge(self%mismatch)
-         if (control%best_yet) self%best_place(:, :, :) = self%place
+         if (control%best_yet) call copy_field(self%place, self%best_place)
          if (control%forget) call self%acceleration%forget()
          if (control%joint_due) then
             ! The next pass is done at the joint solution. If there is none, the attempt has overwritten the result of
@@ -165,7 +166,7 @@ contains
          end if
          call choose_place(self, contact, control)
          ! The last of many passes is done at the best place that was found.
-         if (self%passes == most - 1 .and. most > 10) self%place(:, :, :) = self%best_place
+         if (self%passes == most - 1 .and. most > 10) call copy_field(self%best_place, self%place)
       end do
       associate (forecast => contact%state%tangential%forecast)
          if (self%mismatch <= tolerance) then
@@ -218,7 +219,7 @@ contains
       tangential%ffts = tangential%ffts + transforms
       overwritten = transforms > 0
       if (.not. solved) return
-      self%place(:, :2, :) = contact%tangential%trial
+      call copy_field(contact%tangential%trial, self%place(:, :2, :))
       if (self%sharing) self%place(:, 3, :) = self%edge%share_length*contact%tangential%share
       control%accuracy = verifying*contact%case%solver%tolerance
    end subroutine solve_jointly
@@ -281,14 +282,19 @@ contains
       real(dp), intent(in) :: dt                         !! s
       real(dp), intent(in) :: motion(2)                  !! of the road, m
       logical, intent(in) :: continues                   !! the row continues the motion of the last one
-      integer :: c
+      integer :: c, j
 
       do c = 1, 2
          call carry(contact%grid, contact%state%tangential%displacement(:, c, :), contact%drift - motion, &
             self%carried(:, c, :))
-         self%carried(:, c, :) = self%carried(:, c, :) + contact%drift(c)
       end do
-      self%place(:, :2, :) = self%carried
+      !$omp parallel do default(none) shared(self, contact) private(c, j)
+      do j = 1, contact%grid%rows()
+         do c = 1, 2
+            self%carried(:, c, j) = self%carried(:, c, j) + contact%drift(c)
+            self%place(:, c, j) = self%carried(:, c, j)
+         end do
+      end do
       associate (forecast => contact%state%tangential%forecast)
          call forecast%follow(contact%grid, dt, continues, contact%drift - motion)
          call forecast%add(self%place(:, :2, :))
@@ -308,7 +314,7 @@ contains
       integer :: c, j
 
       if (control%go_back) then
-         self%place(:, :, :) = self%best_place
+         call copy_field(self%best_place, self%place)
          return
       end if
 

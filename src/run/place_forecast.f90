@@ -22,6 +22,7 @@
 module place_forecast
    use asperity_precision, only : dp
    use carried_field, only : carry
+   use field_copies, only : copy_field
    use field_sums, only : row_totals
    use regular_grid, only : grid_type
    implicit none
@@ -73,11 +74,11 @@ contains
       do c = 1, 2
          if (self%known >= 1) then
             call carry(grid, self%change(:, c, :), motion, moved)
-            self%change(:, c, :) = moved
+            call copy_field(moved, self%change(:, c, :))
          end if
          if (self%known >= 2) then
             call carry(grid, self%more(:, c, :), motion, moved)
-            self%more(:, c, :) = moved
+            call copy_field(moved, self%more(:, c, :))
          end if
       end do
    end subroutine follow

@@ -17,6 +17,7 @@ module row_stop
    use arm_state, only : arm_state_type
    use asperity_parallel, only : any_process, global_max
    use asperity_precision, only : dp
+   use field_copies, only : new_copy
    use row_state, only : state_type
    use stop_watch, only : begin_watch, end_watch, stop_question
    implicit none
@@ -57,15 +58,13 @@ contains
       call move_step_fields(state, aside)
       call move_steady_fields(state, aside)
       call move_contact_fields(state, aside)
+      call move_friction_fields(state, aside)
       allocate (self%kept, source=state)
+      call move_friction_fields(aside, state)
       call move_contact_fields(aside, state)
       call move_steady_fields(aside, state)
       call move_step_fields(aside, state)
-      status = 0
-      if (.not. state%first) then
-         allocate (self%kept%pressure, source=state%pressure, stat=status)
-         if (status == 0) allocate (self%kept%gap, source=state%gap, stat=status)
-      end if
+      call copy_large_fields(state, self%kept, status)
       ! If there is not enough memory for the copies, the row is not abandoned.
       if (any_process(status /= 0)) then
          deallocate (self%kept)
@@ -141,6 +140,36 @@ contains
       call move_alloc(from%pressure, to%pressure)
       call move_alloc(from%gap, to%gap)
    end subroutine move_contact_fields
+
+   !> Move the fields of friction that a row changes before its end from one state to another.
+   subroutine move_friction_fields(from, to)
+      type(state_type), intent(inout) :: from, to
+
+      call move_alloc(from%tangential%traction, to%tangential%traction)
+      call move_alloc(from%tangential%before, to%tangential%before)
+      call move_alloc(from%tangential%forecast%change, to%tangential%forecast%change)
+      call move_alloc(from%tangential%forecast%more, to%tangential%forecast%more)
+   end subroutine move_friction_fields
+
+   !> Copy the fields of the contact and of friction. If there is not enough memory, `status` is not 0.
+   subroutine copy_large_fields(from, to, status)
+      type(state_type), intent(in) :: from
+      type(state_type), intent(inout) :: to
+      integer, intent(out) :: status
+
+      status = 0
+      if (.not. from%first) then
+         call new_copy(from%pressure, to%pressure, status)
+         if (status == 0) call new_copy(from%gap, to%gap, status)
+      end if
+      if (.not. allocated(from%tangential%traction)) return
+      associate (t => from%tangential, kept => to%tangential)
+         if (status == 0) call new_copy(t%traction, kept%traction, status)
+         if (status == 0) call new_copy(t%before, kept%before, status)
+         if (status == 0) call new_copy(t%forecast%change, kept%forecast%change, status)
+         if (status == 0) call new_copy(t%forecast%more, kept%forecast%more, status)
+      end associate
+   end subroutine copy_large_fields
 
    !> Move the fields that only the end of a step changes from one state to another.
    subroutine move_step_fields(from, to)

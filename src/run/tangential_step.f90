@@ -15,6 +15,7 @@ module tangential_step
    use case_settings, only : case_type
    use asperity_errors, only : error_type
    use friction_books, only : book_friction, book_rest, mark_idle, rubbed_type
+   use field_copies, only : copy_field
    use field_sums, only : field_count, vector_sum
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
@@ -370,7 +371,7 @@ contains
       call book_friction(state, self%law, self%cell_compliance(), fields, self%trial, rubbed)
       state%lost_friction = state%lost_friction + rubbed%loss*self%grid%cell_area()
       if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%motion/(rubbed%cells*self%dt)
-      state%displacement(:, :, :) = self%trial
+      call copy_field(self%trial, state%displacement)
    end subroutine commit
 
    !> Compute the mean traction, the fraction of the grid that sticks, and the mean slip of the step.
