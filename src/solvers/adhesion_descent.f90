@@ -75,7 +75,7 @@ contains
       largest = largest_change/4**min(now%caution, 10)
       ! If steps were small, a jump of the attraction would stop every cell that arrives at it.
       if (.not. has_smooth_potential(now%problem%potential)) largest = change_at_jump/4**min(now%caution, 10)
-      if (now%failures > 0 .and. .not. keeps_sum(work, now)) call close_narrow_gaps(work, inner)
+      if (now%failures > 0) call close_narrow_gaps(work, inner)
       do k = 1, most
          if (k > 1 .or. abs(inner%pending) > 0.0_dp) call measure(work, inner)
          if (k > 1 .and. inner%residual <= goal*now%residual) exit
@@ -105,11 +105,12 @@ contains
 
    !> Close the gaps that are narrow and about to close anyway. After a step of which only a part was taken, many gaps may
    !> be so narrow that the next step closes them at once. The direction would point downhill mainly in these cells, and
-   !> uphill without them.
+   !> uphill without them. If the sum of the gaps is prescribed, a single such gap may spoil the load, because the load
+   !> is that for which the gradient has no mean over the open cells; the open gaps then keep the sum.
    subroutine close_narrow_gaps(work, inner)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
-      real(dp) :: form
+      real(dp) :: form, shift
       logical :: any_closed
       integer :: j, n
 
@@ -118,17 +119,23 @@ contains
       !$omp num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
          n = work%patch%inner(j)
-         work%change(:, j) = 0.0_dp
+         work%change(:, j) = inner%state(:, j)
          associate (gap => inner%state(1:n, j)/inner%units%length, &
             gradient => -work%residual(1:n, j)/inner%units%traction)
-            where (gap <= narrow .and. gap <= narrow*gradient) work%change(1:n, j) = -inner%state(1:n, j)
+            where (gap <= narrow .and. gap <= narrow*gradient) inner%state(1:n, j) = 0.0_dp
          end associate
-         inner%state(1:n, j) = inner%state(1:n, j) + work%change(1:n, j)
-         any_closed = any_closed .or. any(work%change(1:n, j) < 0.0_dp)
+         any_closed = any_closed .or. any(inner%state(1:n, j) < work%change(1:n, j))
       end do
       if (.not. any_process(any_closed)) return
-      !$omp parallel do default(none) shared(work) private(j) num_threads(work%patch%threads)
+
+      shift = 0.0_dp
+      if (keeps_sum(work, inner)) &
+         shift = sum_shift(inner%state, inner%state, 0.0_dp, inner%gap_sum, work%patch%threads)
+      !$omp parallel do default(none) shared(work, inner, shift) private(j, n) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
+         n = work%patch%inner(j)
+         inner%state(1:n, j) = stepped_gap(inner%state(1:n, j), 0.0_dp, 0.0_dp, shift)
+         work%change(:, j) = inner%state(:, j) - work%change(:, j)
          call work%model%put_row(j, work%change(:, j))
       end do
       call form_product(work, form)

@@ -24,10 +24,11 @@ contains
       spread = contact%problem%datum - field_minimum(contact%height)
       contact%units%length = contact%problem%potential%range
       if (.not. contact%units%length > 0.0_dp) contact%units%length = deviation
+      round_off = 20.0_dp*epsilon(1.0_dp)*spread
       if (self%periodic) then
-         call begin_periodic(self, contact)
+         call begin_periodic(self, round_off, contact)
       else
-         round_off = 20.0_dp*epsilon(1.0_dp)*(abs(contact%level) + spread)
+         round_off = round_off + 20.0_dp*epsilon(1.0_dp)*abs(contact%level)
          contact%units%length = max(contact%units%length, round_off/contact%problem%tolerance)
          call begin_free(self, contact)
       end if
@@ -38,20 +39,27 @@ contains
          max(greatest, contact%problem%modulus*self%longest*deviation)))
    end subroutine begin_contact
 
-   !> Set the prescribed load or sum of the gap, and make the gap satisfy the constraints.
-   subroutine begin_periodic(self, contact)
+   !> Set the prescribed load or sum of the gap, and make the gap satisfy the constraints. If the sum is prescribed, gaps
+   !> within the tolerance or the round-off are set to zero. A cell in contact whose gap is only round-off would count as
+   !> open, and its pressure in the mean of the gradient over the open cells. Its gap is too narrow to lower the energy by
+   !> closing it.
+   subroutine begin_periodic(self, round_off, contact)
       type(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
-      real(dp) :: shift
+      real(dp), intent(in) :: round_off                         !! of the heights, m
+      real(dp) :: shift, narrow
       integer :: j
 
+      narrow = 0.0_dp
+      if (contact%problem%control == control_approach) &
+         narrow = max(contact%problem%tolerance*contact%units%length, round_off)
       contact%level = 0.0_dp
       if (associated(contact%past)) &
          contact%past_mean = field_mean(contact%past)
       if (contact%problem%control == control_pressure) contact%load = contact%problem%target
-      !$omp parallel do default(none) shared(contact) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(contact, narrow) private(j) num_threads(self%threads)
       do j = 1, self%rows
-         contact%state(:, j) = max(contact%state(:, j), 0.0_dp)
+         contact%state(:, j) = merge(contact%state(:, j), 0.0_dp, contact%state(:, j) > narrow)
          if (contact%problem%full_contact) contact%state(:, j) = 0.0_dp
       end do
       if (contact%problem%control /= control_approach) return
