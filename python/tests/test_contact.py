@@ -252,3 +252,35 @@ def test_round_off_is_no_contact():
         touching = contact.pressure > 0
         assert contact.gap[touching].max() < 1e-4 * 1.5e-6, pressure
         assert contact.contact_area == touching.mean()
+
+
+@pytest.mark.filterwarnings("ignore:patches of contact")
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("method", ["fast", "thesis"])
+def test_an_approach_below_the_tolerance_has_a_force(boundary, method):
+    # The bodies overlap by less than the tolerance times the rms height, but they touch.
+    n, side, radius = 64, 1e-3, 1e-2
+    x = (np.arange(n) + 0.5) * side / n - side / 2
+    height = -(x[None, :] ** 2 + x[:, None] ** 2) / (2 * radius)
+    given = {"boundary": boundary, "displacement": 0.9e-3 * height.std(), "method": method}
+    exact = asperity.solve_normal(height, side, side, 4e6, tolerance=1e-10, **given)
+    rough = asperity.solve_normal(height, side, side, 4e6, tolerance=1e-3, **given)
+    assert exact.force > 0
+    assert rough.force == pytest.approx(exact.force, rel=0.03)
+
+
+def test_a_flat_punch_on_a_long_strip_is_accurate():
+    # Love's displacement of five cells in a row, 183 times as long as wide: it must be uniform.
+    length, width, modulus = 0.183, 1e-3, 4e6
+    found = asperity.solve_normal(np.zeros((5, 1)), width, 5 * length, modulus, boundary="free",
+                                  pressure=1e3, tolerance=1e-4)
+    ends = np.array([-0.5, 0.5])
+    moved = np.zeros(5)
+    for i in range(5):
+        for j in range(5):
+            a = ends[None, :] * width
+            b = (i - j + ends[:, None]) * length
+            corner = a * np.arcsinh(b / abs(a)) + b * np.arcsinh(a / abs(b))
+            part = corner[1, 1] - corner[1, 0] - corner[0, 1] + corner[0, 0]
+            moved[i] += found.pressure[j, 0] * part / (np.pi * modulus)
+    assert np.ptp(moved) < 1e-3 * moved.mean()

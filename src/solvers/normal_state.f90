@@ -101,14 +101,15 @@ contains
       task%rms_height = max(task%rms_height, tiny(1.0_dp))
       task%scale = task%rms_height
       task%least_scale = min(task%rms_height, resolved/problem%tolerance)
-      if (highest - lowest <= resolved) task%least_scale = task%rms_height
+      ! On a flat periodic map the displacement under the load is only round-off.
+      if (highest - lowest <= resolved .and. grid%boundary == boundary_periodic) task%least_scale = task%rms_height
    end subroutine prepare_problem
 
    !> Set the height to which the duality gap is compared, for a state near the solution.
    !>
    !> If the contact is small on a tall map, such as on the summit of a sphere, the rms height is not a useful scale,
    !> and ten times the mean displacement under the load is used instead. For a rough contact the scale is the rms
-   !> height.
+   !> height. Without any pressure, at a given approach, the displacement that is missing is the overlap.
    subroutine narrow_scale(task, height, pressure, threads, measure)
       type(normal_problem_type), intent(inout) :: task
       real(dp), intent(in) :: height(:, :), pressure(:, :)
@@ -118,13 +119,18 @@ contains
       real(dp) :: displacement
       integer :: j
 
-      if (measure%load <= 0.0_dp) return
-      allocate (rows(size(height, 2)))
-      !$omp parallel do default(none) shared(height, pressure, rows, task) private(j) num_threads(threads)
-      do j = 1, size(height, 2)
-         rows(j) = dot_product(height(:, j) - task%datum, pressure(:, j))
-      end do
-      displacement = row_total(rows)/measure%load + measure%weighted_level
+      if (measure%load > 0.0_dp) then
+         allocate (rows(size(height, 2)))
+         !$omp parallel do default(none) shared(height, pressure, rows, task) private(j) num_threads(threads)
+         do j = 1, size(height, 2)
+            rows(j) = dot_product(height(:, j) - task%datum, pressure(:, j))
+         end do
+         displacement = row_total(rows)/measure%load + measure%weighted_level
+      else if (task%control == control_approach) then
+         displacement = measure%duality_gap
+      else
+         return
+      end if
       task%scale = task%rms_height
       if (displacement > 0.0_dp) &
          task%scale = min(task%rms_height, max(shallow*displacement, task%least_scale))
