@@ -9,7 +9,7 @@ module adhesion_steps
    use adhesion_potential, only : adhesive_slopes, has_smooth_potential
    use adhesion_state, only : adhesion_problem_type
    use asperity_precision, only : dp
-   use field_sums, only : row_totals
+   use field_sums, only : cell_count, row_totals
    use row_sharing, only : row_sharing_type
    implicit none
    private
@@ -183,7 +183,9 @@ contains
       t = 0.0_dp
       if (.not. known%slope < 0.0_dp) return
       smooth = has_smooth_potential(problem%potential)
-      noise = 4.0_dp*epsilon(1.0_dp)*abs(known%energy)
+      ! Round-off of the difference of two sums over all cells. Changes below it are judged by the slope alone, which is
+      ! accurate to the end.
+      noise = 4.0_dp*epsilon(1.0_dp)*sqrt(cell_count(gap))*abs(known%energy)
       bracket%low_value = known%slope
       t = 1.0_dp
       do pass = 1, merge(8, 1, smooth)
