@@ -134,7 +134,7 @@ contains
       outcome = self%sim%failure()
       call self%files%write_outcome(outcome, error)
       if (.not. allocated(error)) call fail(error, error_convergence, self%files%path//': '//outcome// &
-         '; all steps up to this one are kept')
+         '; the history ends with this step, and all steps before it have converged')
    end subroutine end_unconverged
 
    !> Is a snapshot of the last row due?
