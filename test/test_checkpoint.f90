@@ -111,6 +111,8 @@ contains
       call list(state, table)
       call writer%start(path, 'id', settings, error)
       if (.not. allocated(error)) call writer%put_number('summit', 0.3_dp, error)
+      if (.not. allocated(error)) call writer%put_text('two_lines', 'one'//nl//'two', error)
+      if (.not. allocated(error)) call writer%put_text('no_line', '', error)
       if (.not. allocated(error)) call writer%put_state(table, error)
       if (.not. allocated(error)) call writer%commit(error)
    end subroutine write_state
@@ -146,6 +148,7 @@ contains
       call check_that(reader%result_id == 'id', 'id of the result')
       call reader%get_number('summit', summit, error)
       call check_close(summit, 0.3_dp, 0.0_dp, 'a number beside the state')
+      call check_texts(reader)
       call reader%get_state(table, error)
       call check_no_error(error, 'get the state')
       call check_that(found%truth .and. found%whole == 12 .and. all(found%wholes == [7, -3]), 'integers')
@@ -173,6 +176,23 @@ contains
       call check_error(error, 'the state has 9 pieces, the case needs 8', 'a piece too many')
       call reader%close()
    end subroutine state_comes_back
+
+   !> Texts beside the state; older checkpoints do not have all of them.
+   subroutine check_texts(reader)
+      type(checkpoint_reader_type), intent(inout) :: reader
+      type(error_type), allocatable :: error
+      character(:), allocatable :: text
+
+      call reader%get_text('two_lines', text, error)
+      call check_no_error(error, 'get a text')
+      call check_that(text == 'one'//nl//'two', 'a text beside the state')
+      call reader%get_text('no_line', text, error)
+      call check_no_error(error, 'get an empty text')
+      call check_that(len(text) == 0, 'an empty text beside the state')
+      call reader%get_text('unknown', text, error)
+      call check_no_error(error, 'a text that the checkpoint does not have is no error')
+      call check_that(.not. allocated(text), 'a text that the checkpoint does not have')
+   end subroutine check_texts
 
    !> Every setting that differs is named in the message.
    subroutine other_cases_are_refused()

@@ -14,8 +14,9 @@ import asperity
 from asperity import runner
 
 
-def go(case: Path, rows: int | None = None, *, restart: bool = False) -> list[str]:
-    """Run some rows and stop as after a signal, or run to the end; return the warnings."""
+def go(case: Path, rows: int | None = None, *, restart: bool = False,
+       killed: bool = False) -> list[str]:
+    """Run rows, to the end or to a stop as by a signal or a kill; return the warnings."""
     handle, _, _, _, message = runner._open(os.fsencode(case), b"", b"", 1, int(restart), 0)
     lines = [message]
     finished, done = False, 0
@@ -23,7 +24,7 @@ def go(case: Path, rows: int | None = None, *, restart: bool = False) -> list[st
         finished, *_, message = runner._step(handle, np.zeros(0, np.int32))
         lines.append(message)
         done += 1
-    if not finished:
+    if not finished and not killed:
         runner._interrupt(handle)
     runner._close(handle)
     return [line for text in lines for line in text.decode().strip().splitlines()]
@@ -65,6 +66,16 @@ def test_snapshots_after_stops(tmp_path: Path, output: str) -> None:
     vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
 
 
+PULLED = """
+&grid nx = 48, ny = 48, lx = 1e-3 /
+&surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.2, wavelength_long = 0.25e-3 /
+&material shear_modulus = 1e6, thickness = 1e-3, density = 1000 /
+&friction law = 'coulomb', coefficient = 0.3 /
+&phase pressure = 1e5 /
+&phase duration = 1e-3, traction_x = 1e5, steps = 20 /
+&output checkpoint_every = 2 /
+"""
+
 SWINGING = """
 &grid nx = 48, ny = 1, lx = 1e-3, ly = 1e-3 /
 &surface shape = 'sine', amplitude = 3e-5, wavelength = 0.5e-3 /
@@ -97,6 +108,23 @@ def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:
     while not asperity.open(parts.with_suffix(".h5")).finished:
         found += go(parts, 4, restart=True)
     assert [line for line in found if word in line] == wanted
+    vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
+
+
+def test_warnings_after_a_kill(tmp_path: Path) -> None:
+    """A killed run writes no warnings into its result, so that the checkpoint contains them."""
+    whole, parts = tmp_path / "whole.nml", tmp_path / "parts.nml"
+    for case in (whole, parts):
+        case.write_text(PULLED)
+    go(whole)
+    wanted = asperity.open(whole.with_suffix(".h5")).warnings
+    assert "the pull moves the road by" in wanted[0]
+    for rows, restart in ((4, False), (3, True)):  # the first checkpoint is that of row 2
+        go(parts, rows, restart=restart, killed=True)
+        with h5py.File(parts.with_suffix(".h5")) as file:
+            assert "run_warnings" not in file.attrs
+    go(parts, restart=True)
+    assert asperity.open(parts.with_suffix(".h5")).warnings == wanted
     vc.assert_same(parts.with_suffix(".h5"), whole.with_suffix(".h5"))
 
 

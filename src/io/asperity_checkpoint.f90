@@ -31,6 +31,7 @@ module asperity_checkpoint
    contains
       procedure :: start
       procedure :: put_number
+      procedure :: put_text
       procedure :: put_state
       procedure :: commit
    end type checkpoint_writer_type
@@ -44,6 +45,7 @@ module asperity_checkpoint
       procedure :: open => open_checkpoint
       procedure :: compare
       procedure :: get_number
+      procedure :: get_text
       procedure :: get_state
       procedure :: close => close_checkpoint
    end type checkpoint_reader_type
@@ -90,6 +92,17 @@ contains
       call self%file%write_attribute('/', name, value)
       if (present(error)) call report(self, error)
    end subroutine put_number
+
+   !> Add a text that is not part of the state.
+   subroutine put_text(self, name, value, error)
+      class(checkpoint_writer_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      character(*), intent(in) :: value
+      type(error_type), allocatable, intent(out), optional :: error
+
+      call self%file%write_attribute('/', name, value)
+      if (present(error)) call report(self, error)
+   end subroutine put_text
 
    !> Add the state. Of these procedures only this one is collective: the first process has the file, and each
    !> of the others contributes its rows of the fields.
@@ -241,6 +254,16 @@ contains
 
       call self%file%read_attribute('/', name, value, error)
    end subroutine get_number
+
+   !> Get a text that is not part of the state. It remains unallocated if the checkpoint does not have it.
+   subroutine get_text(self, name, value, error)
+      class(checkpoint_reader_type), intent(inout) :: self
+      character(*), intent(in) :: name
+      character(:), allocatable, intent(out) :: value
+      type(error_type), allocatable, intent(out), optional :: error
+
+      if (self%file%has_attribute('/', name)) call self%file%read_attribute('/', name, value, error)
+   end subroutine get_text
 
    !> Get the state into the memory that the table points to. Arrays must have the same extents.
    !> Collective: the first process has the file.

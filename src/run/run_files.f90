@@ -141,6 +141,7 @@ contains
       integer, intent(out) :: last_snapshot        !! row of the last snapshot in the result; -1 if none
       type(error_type), allocatable, intent(out) :: error
       type(checkpoint_reader_type) :: reader
+      character(:), allocatable :: warnings        ! unallocated if the checkpoint has none
 
       last_snapshot = -1
       call describe(self, sim)
@@ -149,8 +150,10 @@ contains
       if (allocated(error)) return
       call load_state(sim, reader, error)
       if (is_first_process()) then
+         if (.not. allocated(error)) call reader%get_text('run_warnings', warnings, error)
          call reader%close()
          call resume_result(self, sim, reader%result_id, error)
+         if (.not. allocated(error)) call resume_warnings(self, sim, warnings, error)
          if (.not. allocated(error)) last_snapshot = self%result%last_snapshot()
       end if
       call agree(error)
@@ -181,7 +184,6 @@ contains
       call self%result%reopen(self%path, id, sim%state%row%step, &
          sim%case%output%compression, error)
       if (.not. allocated(error)) call self%result%write_text('outcome', 'running', error)
-      call resume_warnings(self, sim, error)
    end subroutine resume_result
 
    !> Check that the height map is that of the checkpoint. For maps from files the checksums in the identity ensure
@@ -206,15 +208,20 @@ contains
          to_text(sim%rms_height)//' m and '//to_text(sim%summit)//' m in the case')
    end subroutine compare_map
 
-   !> Read the earlier warnings of the run, except those of rows that are computed again.
-   subroutine resume_warnings(self, sim, error)
+   !> Recover the earlier warnings of the run. Older checkpoints do not have them: the warnings are then read from
+   !> the result, which has them if the run was stopped and not killed, except those of rows that are computed again.
+   subroutine resume_warnings(self, sim, saved, error)
       type(run_files_type), intent(inout) :: self
       type(simulation_type), intent(in) :: sim
-      type(error_type), allocatable, intent(inout) :: error
+      character(:), allocatable, intent(in) :: saved   !! in the checkpoint; unallocated if it has none
+      type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: left, line
       integer :: at, step, status
 
-      if (allocated(error)) return
+      if (allocated(saved)) then
+         self%warnings = saved
+         return
+      end if
       call self%result%read_text('run_warnings', left, error)
       if (allocated(error)) return
       at = 1
@@ -275,6 +282,7 @@ contains
          call writer%start(self%path, self%result%id, self%identity)
          call writer%put_number('rms_height', sim%rms_height)
          call writer%put_number('summit', sim%summit)
+         call writer%put_text('run_warnings', self%warnings)
       end if
       call save_state(sim, writer)
       if (is_first_process()) then
