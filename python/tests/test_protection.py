@@ -61,6 +61,23 @@ def test_unfinished_run_is_kept(program: str, case: Path) -> None:
     assert done.returncode == 2 and "give one of them" in done.stderr
 
 
+def test_unfinished_run_without_a_checkpoint(program: str, case: Path) -> None:
+    """A run that was killed before its first checkpoint can only be started again."""
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, case.with_suffix(".h5"), 3, signal.SIGKILL)
+    process.communicate(timeout=PATIENCE)
+    assert not case.with_suffix(".checkpoint.h5").exists()
+    done = vc.run(program, case)
+    assert done.returncode == 3
+    assert ("y.h5: holds an unfinished run, and there is no checkpoint: --overwrite starts again"
+            in done.stderr)
+    assert "--restart" not in done.stderr
+    with pytest.raises(OSError, match=r"no checkpoint: overwrite=True starts again"):
+        asperity.run(case)
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 3 and "has no checkpoint from which to continue" in done.stderr
+
+
 def test_overwrite_in_python(program: str, case: Path) -> None:
     """`asperity.run` has the same option."""
     result = stopped(program, case)

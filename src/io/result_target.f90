@@ -101,8 +101,13 @@ contains
                'it, or choose another --output')
             return
          case (is_unfinished)
-            call fail(error, error_file, path//': holds an unfinished run: --restart continues it'// &
-               ' from its last checkpoint, --overwrite replaces it, or choose another --output')
+            if (file_exists(checkpoint)) then
+               call fail(error, error_file, path//': holds an unfinished run: --restart continues it'// &
+                  ' from its last checkpoint, --overwrite replaces it, or choose another --output')
+            else
+               call fail(error, error_file, path//': holds an unfinished run, and there is no checkpoint: '// &
+                  '--overwrite starts again, or choose another --output')
+            end if
             return
          end select
       end if
