@@ -39,6 +39,7 @@ contains
       if (selected('all_sticks_or_all_slips')) call all_sticks_or_all_slips()
       if (selected('same_result_on_two_threads')) call same_result_on_two_threads()
       if (selected('numerical_stick_slip_is_reported')) call numerical_stick_slip_is_reported()
+      if (selected('advice_on_stick_slip')) call advice_on_stick_slip()
       if (selected('contact_sticks_until_the_road_moves')) &
          call contact_sticks_until_the_road_moves()
       if (selected('first_slip_is_lost_in_full')) call first_slip_is_lost_in_full()
@@ -294,6 +295,29 @@ contains
       call run_case(text, 'two threads', two)
       call check_same_rows(one, two, 1e-12_dp, 'threads')
    end subroutine same_result_on_two_threads
+
+   !> The warning of numerical stick-slip recommends more passes only if their number is limited.
+   subroutine advice_on_stick_slip()
+      call check_advice(2, 'Allow more passes (now 2); if that does not end it, give the block the smallest density '// &
+         'that does (now 5 kg/m3)')
+      call check_advice(0, 'Give the block the smallest density that ends it (now 5 kg/m3)')
+   end subroutine advice_on_stick_slip
+
+   !> Compare the advice in the warning of numerical stick-slip.
+   subroutine check_advice(passes, advice)
+      integer, intent(in) :: passes
+      character(*), intent(in) :: advice
+      type(stick_slip_watch_type) :: watch
+      character(:), allocatable :: message, text
+      integer :: k
+
+      text = ''
+      do k = 1, 20
+         call watch_slip(watch, merge(1.2_dp, 0.8_dp, mod(k, 2) == 0), 1.0_dp, passes, 5.0_dp, message)
+         text = text//message
+      end do
+      call check_that(text == 'the mean slip rises and falls from step to step: numerical stick-slip. '//advice, text)
+   end subroutine check_advice
 
    !> A thick elastic block on a short wave, with one pass per step, sticks and slips in turn: linear interpolation makes
    !> the friction vary from cell to cell. This is reported once, also by a run after a restart

@@ -29,7 +29,7 @@ contains
       type(stick_slip_watch_type), intent(inout) :: self
       real(dp), intent(in) :: slip_speed              !! mean over the surface, m/s
       real(dp), intent(in) :: road_speed              !! m/s, >= 0
-      integer, intent(in) :: passes                   !! most passes of a step
+      integer, intent(in) :: passes                   !! most passes of a step; 0: as many as needed
       real(dp), intent(in) :: density                 !! of the block, kg/m3; 0: no inertia
       character(:), allocatable, intent(out) :: message
       real(dp) :: change
@@ -45,9 +45,13 @@ contains
       self%change = change
       if (self%reported .or. self%turns < turns_to_report) return
       self%reported = .true.
-      message = 'the mean slip rises and falls from step to step: numerical stick-slip. Allow more '// &
-         'passes (now '//to_text(passes)//'); if that does not end it, give the block the smallest '// &
-         'density that does (now '//to_text(density)//' kg/m3)'
+      message = 'the mean slip rises and falls from step to step: numerical stick-slip. '
+      if (passes > 0) then
+         message = message//'Allow more passes (now '//to_text(passes)//'); if that does not end it, give the '// &
+            'block the smallest density that does (now '//to_text(density)//' kg/m3)'
+      else
+         message = message//'Give the block the smallest density that ends it (now '//to_text(density)//' kg/m3)'
+      end if
    end subroutine watch_slip
 
 end module stick_slip_watch
