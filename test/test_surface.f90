@@ -43,6 +43,7 @@ contains
       if (selected('long_maps_are_read_in_slabs')) call long_maps_are_read_in_slabs()
       if (selected('warnings_name_what_is_doubtful')) call warnings_name_what_is_doubtful()
       if (selected('map_that_contradicts_the_case')) call map_that_contradicts_the_case()
+      if (selected('steep_maps_are_reported')) call steep_maps_are_reported()
       if (selected('lengths_that_do_not_fit_together')) call lengths_that_do_not_fit_together()
    end subroutine run_surface
 
@@ -611,8 +612,9 @@ contains
       call check_that(size(warnings) == 3, 'there are warnings of size, unit and edges')
       call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': according to the file '// &
          'the map is 2.5000E-01 m by 6.0000E-01 m, but the grid is 5.0000E-01 m by') == 1, 'another length')
-      call check_order(index(warnings(2), 'the unit of the map is um'), '>', 0, 'another unit')
+      call check_order(index(warnings(2), 'the unit of the map is um (attribute units'), '>', 0, 'another unit')
       call check_order(index(warnings(3), 'not periodic'), '>', 0, 'edges that do not fit')
+      call map_in_another_dataset(grid, term)
       term%scale = 1.0e-6_dp
       grid = new_grid(5, 3, 0.25_dp, 0.6_dp, boundary_free)
       call find_warnings(grid, [term], warnings)
@@ -622,6 +624,75 @@ contains
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 0, 'a missing file is an error elsewhere')
    end subroutine map_that_contradicts_the_case
+
+   !> The unit is also read from the second dataset that is looked for, 'surface', and from one that the case names.
+   subroutine map_in_another_dataset(grid, term)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      character(*), parameter :: path = 'build/plain_map.h5'
+      type(hdf5_file_type) :: file
+      type(surface_settings_type) :: other
+      type(error_type), allocatable :: error
+      character(warning_length), allocatable :: warnings(:)
+      integer :: unit
+
+      call file%open(path, 'create', error)
+      call file%write('surface', reshape(spread(0.0_dp, 1, 15), [5, 3]), 'nm', 'height', error)
+      call file%write('level', reshape(spread(0.0_dp, 1, 15), [5, 3]), 'mm', 'height', error)
+      call check_no_error(error, 'a map beside the usual place')
+      call file%close(error)
+      other = term
+      other%file = path
+      call find_warnings(grid, [other], warnings)
+      call check_that(size(warnings) == 1, 'one warning about the dataset ''surface''')
+      call check_order(index(warnings(1), 'the unit of the map is nm'), '>', 0, 'unit of ''surface''')
+      other%dataset = 'level'
+      call find_warnings(grid, [other], warnings)
+      call check_that(size(warnings) == 1, 'one warning about a dataset that is named')
+      call check_order(index(warnings(1), 'the unit of the map is mm'), '>', 0, 'unit of the dataset that is named')
+      open (newunit=unit, file=path, status='old')
+      close (unit, status='delete')
+   end subroutine map_in_another_dataset
+
+   !> The slope of a map from a file is estimated, also from a part of the rows of a long map.
+   subroutine steep_maps_are_reported()
+      character(*), parameter :: path = 'build/steep_map.h5'
+      type(grid_type) :: grid
+      type(hdf5_file_type) :: file
+      type(surface_settings_type) :: term
+      type(error_type), allocatable :: error
+      character(warning_length), allocatable :: warnings(:)
+      real(dp), allocatable :: map(:, :)
+      integer :: i, j, unit
+
+      do j = 0, 1
+         ! Slopes of 3 along x and of 4 along y, on a map of few and on one of very many rows.
+         grid = new_grid(4, merge(6, 3000000, j == 0), 2.0_dp, merge(3.0_dp, 1.5e6_dp, j == 0), boundary_free)
+         allocate (map(grid%nx, grid%ny))
+         do i = 1, grid%ny
+            map(:, i) = 1.5_dp*[1, 2, 3, 4] + 2.0_dp*i
+         end do
+         term = default_surface(grid)
+         term%shape = 'file'
+         term%file = path
+         call file%open(path, 'create', error)
+         call file%write('surface', map, 'm', 'height', error)
+         call check_no_error(error, 'a steep map')
+         call file%close(error)
+         deallocate (map)
+         call find_warnings(grid, [term], warnings)
+         call check_that(size(warnings) == 1, 'a steep map causes a warning')
+         call check_order(index(warnings(1), 'the slope of the map is about 5.00E+00, but'), '>', 0, trim(warnings(1)))
+         term%scale = -0.59_dp
+         call find_warnings(grid, [term], warnings)
+         call check_that(size(warnings) == 0, 'a slope of 2.95 after scaling: no warning')
+      end do
+      grid = new_grid(6, 4, 2.0_dp, 3.0_dp, boundary_free)
+      call find_warnings(grid, [term], warnings)
+      call check_that(size(warnings) == 0, 'a map of another shape is an error elsewhere')
+      open (newunit=unit, file=path, status='old')
+      close (unit, status='delete')
+   end subroutine steep_maps_are_reported
 
    !> Very oblong cells and very steep waves cause warnings, because a length may be in another unit.
    subroutine lengths_that_do_not_fit_together()

@@ -270,6 +270,26 @@ def test_info_of_a_killed_run_says_how_long_a_row_takes(program, tmp_path):
         file.attrs["finished"] = np.int32(0)
         file.attrs["expected_rows"] = np.int32(7)
         del file.attrs["outcome"]
+@pytest.mark.parametrize("dataset", ["surface", "surface/height"])
+def test_a_height_map_in_another_unit_causes_warnings(program, tmp_path, dataset):
+    """The unit that the file states, and the slope, are warned of by `check` and by `run`."""
+    text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file[dataset] = 5.0 * np.cos(2 * np.pi * np.arange(16) / 16) * np.ones((8, 1))
+        file[dataset].attrs["units"] = "um"
+    unit = ("&surface: file = 'map.h5': according to the file the unit of the map is um (attribute"
+            " units of its dataset), but its heights are read as metres, m: set scale")
+    slope = "&surface: file = 'map.h5': the slope of the map is about"
+    done = check(program, tmp_path, text)
+    assert f"! warning: {unit}" in done.out and f"! warning: {slope}" in done.out
+    done = call(program, "run", "case.nml", "--quiet", cwd=tmp_path)
+    assert done.err.startswith(unit) and slope in done.err
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert unit in file.attrs["warnings"] and slope in file.attrs["warnings"]
+    done = check(program, tmp_path, text.replace("'map.h5'", "'map.h5', scale = 1e-6"))
+    assert "warning" not in done.out
+
+
         file.attrs["outcome"] = np.bytes_("running")
         file["history/seconds"][-1] = 2.25
     done = call(program, "info", "case.h5", cwd=tmp_path)

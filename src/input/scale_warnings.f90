@@ -7,6 +7,7 @@ module scale_warnings
    use regular_grid, only : grid_type
    use surface_settings, only : surface_settings_type
    use surface_shapes, only : find_shape, shape_type
+   use surface_warnings, only : largest_slope
    use text_tools, only : to_text
    implicit none
    private
@@ -15,7 +16,6 @@ module scale_warnings
 
    real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it a length is often wrong
    real(dp), parameter :: least_radius = 4.0_dp       !! of a cap, cells: below it no contact on the cap is resolved
-   real(dp), parameter :: largest_slope = 3.0_dp      !! far beyond what a theory for small slopes describes
    integer, parameter :: many_rows = 100000           !! of a run: above it a mistake is costly
 
 contains

@@ -1,22 +1,30 @@
 !> Warnings about a surface that is allowed but doubtful: a random surface with wavelengths that its
 !> grid does not hold (thesis, 4.1), waves that do not close on the period of the grid, waves with
-!> too few cells, and height maps whose files state another size, unit or boundary than the input.
+!> too few cells, and height maps that are very steep or whose files state another size, unit or boundary than the
+!> input.
 module surface_warnings
    use asperity_errors, only : error_type
    use asperity_parallel, only : is_first_process
    use hdf5_file, only : hdf5_file_type
+   use hdf5_slab_reader, only : slab_reader_type
+   use hdf5_slabs, only : slab_rows
    use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use surface_settings, only : surface_settings_type
    use surface_shapes, only : find_shape, shape_type
+   use text_tools, only : in_one_line
+   use trial_process, only : trial_type
    implicit none
    private
 
    public :: find_warnings
 
    integer, parameter, public :: warning_length = 400
+   real(dp), parameter, public :: largest_slope = 3.0_dp   !! far beyond what a theory for small slopes describes
    real(dp), parameter :: cells_per_wave = 8.0_dp      !! enough for contact areas of some percent
    real(dp), parameter :: round_off = 1.0e-9_dp
+   integer, parameter :: most_slabs = 64               !! of a map, from which its slope is estimated: 64 MiB
+   integer, parameter :: patience = 120                !! longest time for the trial of a map, s
 
 contains
 
@@ -59,24 +67,23 @@ contains
          .not. shape%period_y > 0.0_dp, warnings)
    end subroutine check_wave
 
-   !> The lengths, the unit and the boundary that the file of a map states must agree with the
-   !> input. No warning is given about a file that states none of them, or that cannot be read:
-   !> reading the map itself reports that as an error. Only the first process opens files.
+   !> The slope of a map must be moderate, and the lengths, the unit and the boundary that its file states must agree
+   !> with the input. No warning is given about a file that states none of them, or that cannot be read: reading the
+   !> map itself reports that as an error. Only the first process opens files.
    subroutine check_map(grid, term, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
       character(warning_length), allocatable, intent(inout) :: warnings(:)
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
-      character(:), allocatable :: boundary, map, start, units
+      character(:), allocatable :: boundary, map, start
       character(warning_length) :: text
       real(dp) :: lx, ly
 
       if (.not. is_first_process()) return
       call file%open(trim(term%file), 'read', error)
       if (allocated(error)) return
-      map = trim(term%dataset)
-      if (map == '') map = 'surface/height'
+      map = map_name(file, term)
       start = '&surface: file = '''//last_of(term%file)//''': '
       lx = length_of(file, map, 'lx')
       ly = length_of(file, map, 'ly')
@@ -87,16 +94,7 @@ contains
             ' m by ', grid%ly, ' m: this changes its slopes'
          call append(warnings, text)
       end if
-      if (file%has_attribute(map, 'units') .and. abs(term%scale - 1.0_dp) <= 0.0_dp) then
-         call file%read_attribute(map, 'units', units, error)
-         if (.not. allocated(error)) then
-            if (all(trim(units) /= [character(5) :: 'm', '1', '', 'metre', 'meter'])) then
-               text = start//'according to the file the unit of the map is '//trim(units)// &
-                  ', but its heights are read as metres; set scale to convert them'
-               call append(warnings, text)
-            end if
-         end if
-      end if
+      call check_unit(file, map, start, term%scale, warnings)
       if (term%dataset == '' .and. file%has_attribute('/grid', 'boundary') .and. &
          grid%boundary == boundary_periodic .and. grid%ny > 1) then
          call file%read_attribute('/grid', 'boundary', boundary, error)
@@ -109,7 +107,130 @@ contains
          end if
       end if
       call file%close(error)
+      call check_slope(grid, term, map, start, warnings)
    end subroutine check_map
+
+   !> The dataset with the map of a term.
+   function map_name(file, term) result(map)
+      type(hdf5_file_type), intent(inout) :: file
+      type(surface_settings_type), intent(in) :: term
+      character(:), allocatable :: map
+
+      map = trim(term%dataset)
+      if (map /= '') return
+      map = 'surface/height'
+      if (.not. file%has_dataset(map)) map = 'surface'
+   end function map_name
+
+   !> The unit that the file states must be the metre, unless `scale` converts the heights.
+   subroutine check_unit(file, map, start, scale, warnings)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: map             !! the dataset
+      character(*), intent(in) :: start           !! of the warning
+      real(dp), intent(in) :: scale
+      character(warning_length), allocatable, intent(inout) :: warnings(:)
+      type(error_type), allocatable :: error
+      character(:), allocatable :: units
+      character(warning_length) :: text
+
+      if (abs(scale - 1.0_dp) > 0.0_dp .or. .not. file%has_attribute(map, 'units')) return
+      call file%read_attribute(map, 'units', units, error)
+      if (allocated(error)) return
+      if (any(trim(units) == [character(5) :: 'm', '1', '', 'metre', 'meter'])) return
+      text = start//'according to the file the unit of the map is '//in_one_line(trim(units), 40)// &
+         ' (attribute units of its dataset), but its heights are read as metres, m: set scale to convert them'
+      call append(warnings, text)
+   end subroutine check_unit
+
+   !> The heights of a map in another unit make it far too steep.
+   subroutine check_slope(grid, term, map, start, warnings)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      character(*), intent(in) :: map             !! the dataset
+      character(*), intent(in) :: start           !! of the warning
+      character(warning_length), allocatable, intent(inout) :: warnings(:)
+      type(error_type), allocatable :: error
+      type(trial_type) :: trial
+      character(warning_length) :: text
+      real(dp) :: slope
+
+      ! HDF5 may crash or hang on a damaged file, so that a separate process reads it first.
+      call trial%start(patience)
+      if (trial%is_copy) then
+         call estimate_slope(grid, term, map, slope)
+         call trial%leave()
+      end if
+      call trial%verdict(trim(term%file), error)
+      if (allocated(error)) return
+      call estimate_slope(grid, term, map, slope)
+      if (.not. slope > largest_slope) return
+      write (text, '(a, es8.2, a)') start//'the slope of the map is about ', slope, &
+         ', but the solid is linear and its surface flat, which holds for small slopes only: check the unit of the '// &
+         'heights, which are read as metres times scale, and lx and ly'
+      call append(warnings, text)
+   end subroutine check_slope
+
+   !> The rms slope of a map on the grid, from slabs of rows that are spread over it. It is 0 if the map cannot be read
+   !> or has another shape than the grid.
+   subroutine estimate_slope(grid, term, map, slope)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      character(*), intent(in) :: map             !! the dataset
+      real(dp), intent(out) :: slope
+      type(hdf5_file_type) :: file
+      type(slab_reader_type) :: slabs
+      type(error_type), allocatable :: error, ignored
+      real(dp), allocatable :: slab(:, :)
+      integer, allocatable :: extent(:)
+      real(dp) :: squares(2), pairs(2)
+      integer :: k, parts, rows
+
+      slope = 0.0_dp
+      squares = 0.0_dp
+      pairs = tiny(1.0_dp)
+      call file%open(trim(term%file), 'read', error)
+      if (allocated(error)) return
+      call file%dataset_shape(map, extent, error)
+      if (fits(extent, grid)) then
+         rows = min(grid%ny, max(2, slab_rows(grid%nx)))
+         parts = min(most_slabs, (grid%ny - 1)/rows + 1)
+         allocate (slab(grid%nx, rows))
+         call slabs%open(file, map, error)
+         do k = 1, parts
+            if (allocated(error)) exit
+            call slabs%read(file, 1 + int(real(grid%ny - rows, dp)*(k - 1)/max(parts - 1, 1)), slab, error)
+            if (allocated(error)) exit
+            call add_squares(grid, slab, squares, pairs)
+         end do
+         call slabs%close()
+      end if
+      call file%close(ignored)
+      if (.not. allocated(error)) slope = abs(term%scale)*sqrt(sum(squares/pairs))
+   end subroutine estimate_slope
+
+   !> Does a dataset have the shape of the grid?
+   pure logical function fits(extent, grid)
+      integer, allocatable, intent(in) :: extent(:)    !! nx, ny; unallocated after an error
+      type(grid_type), intent(in) :: grid
+
+      fits = allocated(extent)
+      if (fits) fits = size(extent) == 2
+      if (fits) fits = all(extent == [grid%nx, grid%ny])
+   end function fits
+
+   !> Add the squares of the slopes between neighbouring points, along x and along y, and their numbers.
+   pure subroutine add_squares(grid, slab, squares, pairs)
+      type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: slab(:, :)
+      real(dp), intent(inout) :: squares(2), pairs(2)
+      integer :: j
+
+      do j = 1, size(slab, 2)
+         squares(1) = squares(1) + sum(((slab(2:, j) - slab(:grid%nx - 1, j))/grid%dx)**2)
+         if (j > 1) squares(2) = squares(2) + sum(((slab(:, j) - slab(:, j - 1))/grid%dy)**2)
+      end do
+      pairs = pairs + [real(grid%nx - 1, dp)*size(slab, 2), real(grid%nx, dp)*(size(slab, 2) - 1)]
+   end subroutine add_squares
 
    !> A length that the attributes of a map, or of the grid in its file, state; 0 if there is none.
    function length_of(file, map, name) result(length)
