@@ -52,6 +52,9 @@ def folder(tmp_path_factory):
     ("1e6 /", "1e6, temperature = 50 /", "&material: temperature = 50 has no effect"),
     ("1e6 /", "1e6, temperature = 50, wlf_c1 = 5, wlf_c2 = 100 /", ""),
     ("1e6 /", "1e6, temperature = 20 /", ""),
+    ("1e5 /", "1e5, force = 1, control = 'force' /",
+     "&phase 1: pressure = 100000 has no effect: control = 'force' does not use it"),
+    ("1e5 /", "1e5, control = 'pressure' /", ""),
 ])
 def test_values_without_effect_are_reported(program, folder, old, new, printed):
     done = check(program, folder, GOOD.replace(old, new, 1))

@@ -10,7 +10,7 @@ module case_phases
    use input_group, only : group_values_type
    use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
-   use text_tools, only : to_text
+   use text_tools, only : add_line, to_text
    implicit none
    private
 
@@ -59,6 +59,7 @@ contains
                call resolve_load(group, phase, faults, phases(i - 1))
             end if
 
+            call warn_of_other_loads(i, group, phase, warnings)
             call check_load(group, phase, adhesive, faults)
             call check_combination(group, phase, material, faults)
             if (phase%steady) call check_steady(group, phase, grid, material, adhesive, faults)
@@ -125,6 +126,23 @@ contains
             'one of them', faults)
       end if
    end subroutine resolve_load
+
+   !> Warn of loads that have no effect, because `control` names another one.
+   subroutine warn_of_other_loads(number, group, phase, warnings)
+      integer, intent(in) :: number                            !! of the phase
+      type(group_values_type), intent(in) :: group
+      type(phase_settings_type), intent(in) :: phase
+      character(:), allocatable, intent(inout) :: warnings
+      integer :: i
+
+      if (.not. group%given('control') .or. phase%control == '') return
+      do i = 1, size(loads)
+         if (loads(i) == phase%control .or. .not. group%usable(trim(loads(i)))) cycle
+         call add_line(warnings, '&phase '//to_text(number)//': '//trim(loads(i))//' = '// &
+            to_text(group%real_value(trim(loads(i))))//' has no effect: control = '''//trim(phase%control)// &
+            ''' does not use it')
+      end do
+   end subroutine warn_of_other_loads
 
    !> Read the force that pulls the road along each direction, if one is given instead of a velocity.
    subroutine resolve_pull(group, grid, phase, faults)
