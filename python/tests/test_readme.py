@@ -51,6 +51,19 @@ def test_links_lead_somewhere():
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
+def test_links_within_a_page_leave_their_section():
+    for page in (ROOT / "docs").glob("*.md"):
+        names, inside = set(), []
+        name = ""
+        for line in page.read_text().splitlines():
+            if line.startswith("#"):
+                name = re.sub(r"[^\w -]", "", line.lstrip("# ").lower()).replace(" ", "-")
+                names.add(name)
+            inside += [(name, target) for target in re.findall(r"\]\(#([^)]+)\)", line)]
+        for section, target in inside:
+            assert target in names and target != section, f"{page.name}: #{target}"
+
+
 def test_result_page_names_every_dataset(program, tmp_path):
     text = subprocess.run([program, "template", "friction"], check=True, capture_output=True,
                           text=True).stdout
