@@ -63,6 +63,27 @@ def test_values_without_effect_are_reported(program, folder, old, new, printed):
     assert f"! warning: {printed}" in done.out or not printed
 
 
+@pytest.mark.parametrize(("phase", "law", "printed"), [
+    ("", "", ""),
+    ("duration = 1, velocity_x = 1e-4", "", ""),
+    ("steady = .true., velocity_x = 1e-4", "", "If a steady row converges slowly, the pressures of"
+     " all cells are solved for at once. This takes up to"),
+    ("duration = 1, velocity_x = 1e-4", "&friction law = 'coulomb', coefficient = 0.3 /",
+     "Pressure and friction of a row are solved for in turn. If that does not settle, both are"
+     " solved for together, in all cells at once. This takes up to"),
+])
+def test_memory_of_rows_that_are_solved_at_once(program, folder, phase, law, printed):
+    """`check` says what is solved at once, how much memory this takes, and what is lost without."""
+    done = check(program, folder, GOOD.replace("1e5 /", f"1e5, {phase} /") + law + "\n")
+    assert done.returncode == 0, done.err
+    lines = [line for line in done.out.splitlines() if "takes up to" in line and "at once" in line]
+    assert len(lines) == (1 if printed else 0)
+    if printed:
+        assert lines[0].startswith(f"! {printed}")
+        assert lines[0].endswith("Without this memory the run continues, but such a row may not"
+                                 " converge, which ends the run with status 4")
+
+
 def test_version(program, root):
     done = call(program, "--version")
     assert done.returncode == 0
@@ -249,6 +270,26 @@ def test_check_reads_height_maps(program, tmp_path):
     assert call(program, "check", tmp_path / "case.nml").returncode == 2  # from another folder
 
 
+@pytest.mark.parametrize("dataset", ["surface", "surface/height"])
+def test_a_height_map_in_another_unit_causes_warnings(program, tmp_path, dataset):
+    """The unit that the file states, and the slope, are warned of by `check` and by `run`."""
+    text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file[dataset] = 5.0 * np.cos(2 * np.pi * np.arange(16) / 16) * np.ones((8, 1))
+        file[dataset].attrs["units"] = "um"
+    unit = ("&surface: file = 'map.h5': according to the file the unit of the map is um (attribute"
+            " units of its dataset), but its heights are read as metres, m: set scale")
+    slope = "&surface: file = 'map.h5': the slope of the map is about"
+    done = check(program, tmp_path, text)
+    assert f"! warning: {unit}" in done.out and f"! warning: {slope}" in done.out
+    done = call(program, "run", "case.nml", "--quiet", cwd=tmp_path)
+    assert done.err.startswith(unit) and slope in done.err
+    with h5py.File(tmp_path / "case.h5") as file:
+        assert unit in file.attrs["warnings"] and slope in file.attrs["warnings"]
+    done = check(program, tmp_path, text.replace("'map.h5'", "'map.h5', scale = 1e-6"))
+    assert "warning" not in done.out
+
+
 def test_a_missing_height_map_is_reported_with_its_place(program, tmp_path):
     """The message names input, group, variable and line, and reports several maps at once."""
     text = GOOD.replace("shape = 'sphere', radius = 0.01 /",
@@ -273,26 +314,6 @@ def test_info_of_a_killed_run_says_how_long_a_row_takes(program, tmp_path):
         file.attrs["finished"] = np.int32(0)
         file.attrs["expected_rows"] = np.int32(7)
         del file.attrs["outcome"]
-@pytest.mark.parametrize("dataset", ["surface", "surface/height"])
-def test_a_height_map_in_another_unit_causes_warnings(program, tmp_path, dataset):
-    """The unit that the file states, and the slope, are warned of by `check` and by `run`."""
-    text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
-    with h5py.File(tmp_path / "map.h5", "w") as file:
-        file[dataset] = 5.0 * np.cos(2 * np.pi * np.arange(16) / 16) * np.ones((8, 1))
-        file[dataset].attrs["units"] = "um"
-    unit = ("&surface: file = 'map.h5': according to the file the unit of the map is um (attribute"
-            " units of its dataset), but its heights are read as metres, m: set scale")
-    slope = "&surface: file = 'map.h5': the slope of the map is about"
-    done = check(program, tmp_path, text)
-    assert f"! warning: {unit}" in done.out and f"! warning: {slope}" in done.out
-    done = call(program, "run", "case.nml", "--quiet", cwd=tmp_path)
-    assert done.err.startswith(unit) and slope in done.err
-    with h5py.File(tmp_path / "case.h5") as file:
-        assert unit in file.attrs["warnings"] and slope in file.attrs["warnings"]
-    done = check(program, tmp_path, text.replace("'map.h5'", "'map.h5', scale = 1e-6"))
-    assert "warning" not in done.out
-
-
         file.attrs["outcome"] = np.bytes_("running")
         file["history/seconds"][-1] = 2.25
     done = call(program, "info", "case.h5", cwd=tmp_path)

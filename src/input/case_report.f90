@@ -73,15 +73,31 @@ contains
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
       text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
-      if (joint_memory(case) > 0.0_dp) text = text//'! A step or a steady row that must be solved all at once takes up to '// &
-         memory_text(joint_memory(case))//' more, depending on how many cells touch; if this memory is not available, '// &
-         'the run continues without this solution'//nl
+      text = text//joint_note(case)
       if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
          ': '//memory_text(limit)//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'//nl
       text = text//marked('! ', adhesion_notes(case))// &
          marked('! note: ', footprint_note(case))//marked('! warning: ', case%warnings)
    end function case_summary
+
+   !> What is solved for all cells at once if it must be, the memory that this takes, and what is lost without that
+   !> memory, as a comment line. Empty if the case has nothing of this kind.
+   function joint_note(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+
+      text = ''
+      if (.not. joint_memory(case) > 0.0_dp) return
+      if (case%friction%law == 'none') then
+         text = '! If a steady row converges slowly, the pressures of all cells are solved for at once. This'
+      else
+         text = '! Pressure and friction of a row are solved for in turn. If that does not settle, both are solved '// &
+            'for together, in all cells at once. This'
+      end if
+      text = text//' takes up to '//memory_text(joint_memory(case))//' more, depending on how many cells touch. '// &
+         'Without this memory the run continues, but such a row may not converge, which ends the run with status 4'//nl
+   end function joint_note
 
    !> Put a mark before each line.
    pure function marked(mark, lines) result(text)
