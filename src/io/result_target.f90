@@ -10,7 +10,6 @@ module result_target
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
    use file_system, only : file_exists, folder_of, is_folder
    use hdf5_file, only : hdf5_file_type
-   use result_check, only : damage_type, find_damage
    use result_names, only : checkpoint_path, side_file, side_files
    use trial_process, only : trial_type
    implicit none
@@ -173,38 +172,21 @@ contains
    end function kind_of
 
    !> Read a result in a separate process. It is an error if that process crashes or does not end.
-   subroutine damage_of_result(path, error, fields)
+   subroutine damage_of_result(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
-      logical, intent(in), optional :: fields   !! read the fields as well; default no
       type(trial_type) :: trial
 
       if (allocated(error)) return
       call trial%start(patience)
       if (trial%is_copy) then
          call read_result(path)
-         if (present(fields)) then
-            if (fields) call read_fields(path)
-         end if
          call trial%leave()
       end if
       call trial%verdict(path, error)
    end subroutine damage_of_result
 
-   !> Read everything that is checked for damage.
-   subroutine read_fields(path)
-      character(*), intent(in) :: path
-      type(hdf5_file_type) :: file
-      type(error_type), allocatable :: error
-      type(damage_type) :: found
-
-      call file%open(path, 'read', error)
-      if (allocated(error)) return
-      call find_damage(file, found)
-      call file%close()
-   end subroutine read_fields
-
-   !> Read everything that a restart and a summary read. Errors are ignored, because only a crash
+   !> Read everything that a restart reads. Errors are ignored, because only a crash
    !> matters here.
    subroutine read_result(path)
       character(*), intent(in) :: path

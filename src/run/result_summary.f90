@@ -9,29 +9,44 @@ module result_summary
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp
    use result_check, only : damage_type, find_damage
-   use result_target, only : damage_of_result
    use text_tools, only : in_one_line, in_quotes, next_line, to_text
+   use trial_process, only : trial_type
    implicit none
    private
 
    public :: summarise_result
 
    character(*), parameter :: nl = new_line('a')
+   integer, parameter :: patience = 60          !! longest time for the trial of a file, s
 
 contains
 
    !> Read a result and summarise it. The run may still be in progress. If parts of the result are damaged, there is
-   !> both a summary and an error.
+   !> both a summary and an error. HDF5 may crash on a damaged file, so that a separate process does all of this first.
    subroutine summarise_result(path, text, error)
       character(*), intent(in) :: path
       character(:), allocatable, intent(out) :: text   !! '' if the result cannot be read
       type(error_type), allocatable, intent(out) :: error
+      type(trial_type) :: trial
+
+      text = ''
+      call trial%start(patience)
+      if (trial%is_copy) then
+         call read_summary(path, text, error)
+         call trial%leave()
+      end if
+      call trial%verdict(path, error)
+      if (.not. allocated(error)) call read_summary(path, text, error)
+   end subroutine summarise_result
+
+   !> Summarise a result in this process.
+   subroutine read_summary(path, text, error)
+      character(*), intent(in) :: path
+      character(:), allocatable, intent(inout) :: text
+      type(error_type), allocatable, intent(out) :: error
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: ignored
 
-      text = ''
-      call damage_of_result(path, error, fields=.true.)
-      if (allocated(error)) return
       call file%open(path, 'read', error)
       if (allocated(error)) return
       if (file%has_attribute('/', 'finished')) then
@@ -46,7 +61,7 @@ contains
             ' and no dataset surface/height or surface')
       end if
       call file%close(ignored)
-   end subroutine summarise_result
+   end subroutine read_summary
 
    !> Add the names of the damaged parts of a result.
    subroutine add_damage(file, path, text, error)
