@@ -4,6 +4,7 @@ import re
 import subprocess
 from typing import NamedTuple
 
+import h5py
 import numpy as np
 import pytest
 
@@ -631,6 +632,38 @@ def test_the_table_is_not_written_over(tmp_path, capsys):
     assert main(["fit", str(path), "-o", str(group), "--plot", "fit.xyz"]) == 2
     assert "fit.xyz: the ending must be .png" in capsys.readouterr().err
     assert path.read_text() == before and not group.exists()
+
+
+def test_files_that_a_fit_does_not_write_are_kept(tmp_path, capsys):
+    """The table, topographies, results and other tables; an earlier fit may be replaced."""
+    table = write(tmp_path / "dma.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
+                  sweeps([0.0, 20.0, 40.0], np.logspace(-1, 2, 13)))
+    group, shifts = tmp_path / "a.nml", tmp_path / "shifts.csv"
+    result, plate, other = (tmp_path / name for name in ("r.h5", "plate.x3p", "other.csv"))
+    with h5py.File(result, "w") as file:
+        file.create_group("history")
+    plate.write_bytes(b"PK\x03\x04\0" + bytes(range(256)) + b"\n&grid \n&material \n")
+    other.write_text("temperature,pressure\n20,1e5\n")
+    kept = {path: path.read_bytes() for path in (table, result, plate, other)}
+    for options, message in (
+            (["--shifts", table], "dma.csv: is the table itself"),
+            (["--shifts", result], "r.h5: the name of a table of shifts must end in .csv"),
+            (["--shifts", other], "other.csv: exists and is not a table of shifts"),
+            (["--shifts", tmp_path / "none" / "s.csv"], "there is no folder"),
+            (["-o", shifts, "--shifts", shifts], "shifts.csv: is the file of --output, too"),
+            (["-o", tmp_path / "x.pdf", "--plot", tmp_path / "x.pdf"], "is the file of --output"),
+            (["-o", plate], "plate.x3p: exists and is not a material that `asperity fit` writes"),
+            (["-o", other], "other.csv: exists and is not a material"),
+            (["-o", result], "r.h5: is the result of a run: name another file")):
+        assert main(["fit", str(table), *map(str, options)]) in (2, 3)
+        assert message in capsys.readouterr().err, options
+    assert {path: path.read_bytes() for path in kept} == kept
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept}
+    for _ in "twice":
+        assert main(["fit", str(table), "-o", str(group), "--shifts", str(shifts)]) == 0
+    fit = fit_dma(read_dma(table))
+    with pytest.raises(ValueError, match=r"other\.csv: exists and is not a table of shifts"):
+        fit.write_shifts(other)
 
 
 def test_a_fit_that_fails_is_status_4(tmp_path, monkeypatch, capsys):

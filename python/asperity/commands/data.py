@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-__all__ = ["add_columns", "add_fit", "add_import", "check_folder", "columns_of"]
+from ..base.files import INPUT, MATERIAL, check_folder, check_output
+
+__all__ = ["add_columns", "add_fit", "add_import", "columns_of"]
 
 
 def add_import(verbs: Any) -> None:
@@ -133,10 +135,30 @@ def columns_of(chosen: argparse.Namespace) -> dict[str, str]:
     return columns
 
 
-def check_folder(path: Path) -> None:
-    """Raise OSError if the folder of a file that is to be written does not exist."""
-    if not path.parent.is_dir():
-        raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
+def _check_outputs(chosen: argparse.Namespace) -> None:
+    """Refuse outputs of a fit that are the table or each other, or would replace other files."""
+    from ..rubber.dma_fit import check_shifts
+    from ..views.style import check_picture
+
+    names = ("output", "shifts", "plot")
+    given = {f"--{name}": getattr(chosen, name) for name in names if getattr(chosen, name)}
+    known = {chosen.table.resolve(): "the table itself"}
+    for option, path in given.items():
+        place = path.resolve()
+        if place in known:
+            raise ValueError(f"{option} {path}: is {known[place]}: name another file")
+        known[place] = f"the file of {option}, too"
+    if chosen.output is not None:
+        check_output(chosen.output, MATERIAL, INPUT)
+        other = _other_groups(chosen.output)
+        if other:
+            raise ValueError(f"--output {chosen.output}: holds {other}, too, and would be replaced:"
+                             " name another file, and add the group from there")
+    if chosen.shifts is not None:
+        check_shifts(chosen.shifts)
+    if chosen.plot is not None:
+        check_picture(chosen.plot)
+        check_folder(chosen.plot)
 
 
 def _other_groups(path: Path) -> str:
@@ -151,20 +173,10 @@ def _other_groups(path: Path) -> str:
 def _fit(chosen: argparse.Namespace) -> int:
     """Fit a table, write the files, and print a summary."""
     from ..rubber.dma import fit_dma, read_dma
-    from ..views.style import check_picture, save_picture
+    from ..views.style import save_picture
 
-    check_picture(chosen.plot)
+    _check_outputs(chosen)
     output = chosen.output
-    if output is not None:
-        check_folder(output)
-        if output.exists() and chosen.table.exists() and output.samefile(chosen.table):
-            raise ValueError(f"--output {output}: is the table itself")
-        other = _other_groups(output)
-        if other:
-            raise ValueError(f"--output {output}: holds {other}, too, and would be replaced: name"
-                             " another file, and add the group from there")
-    if chosen.plot is not None:
-        check_folder(chosen.plot)
     table = read_dma(
         chosen.table, columns=columns_of(chosen), frequency_unit=chosen.frequency_unit,
         modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .data import add_columns, check_folder, columns_of
+from ..base.files import check_folder
+from .data import add_columns, columns_of
 
 if TYPE_CHECKING:
     from ..results.friction_curve import FrictionCurve

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import number, positive
+from ..base.files import SHIFTS, SHIFTS_HEAD, check_output
 from ..base.names import counted
 from ..base.presenters import present
 from .dma_sweeps import Sweep, drift_note, sweeps_of
@@ -23,7 +24,7 @@ from .wlf import WLF
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["DmaFit", "fit_dma"]
+__all__ = ["DmaFit", "check_shifts", "fit_dma"]
 
 FloatArray = NDArray[np.float64]
 
@@ -153,7 +154,7 @@ class DmaFit:
         Parameters
         ----------
         path : str or Path
-            The file, NAME.csv.
+            The file, NAME.csv. An older table of shifts is replaced.
 
         Returns
         -------
@@ -163,18 +164,20 @@ class DmaFit:
         Raises
         ------
         ValueError
-            If the data have a single temperature.
+            If the data have a single temperature, the name has another ending, or it is that of
+            another file.
         OSError
             If the file cannot be written.
         """
         if len(self.shifts) < 2:
             raise ValueError(f"{self.name}: has no sweeps at several temperatures: there are no"
                              " shifts to write")
+        path = Path(path)
+        check_shifts(path)
         upward = dict(self.vertical_shifts)
-        lines = ["temperature,log10_a_t,a_t,b_t"]
+        lines = [SHIFTS_HEAD]
         lines += [f"{t!r},{shift!r},{10.0**shift!r},{10.0**upward.get(t, 0.0)!r}"
                   for t, shift in self.shifts]
-        path = Path(path)
         path.write_text("\n".join(lines) + "\n", encoding="ascii")
         return path
 
@@ -186,6 +189,21 @@ class DmaFit:
         matplotlib Figure
         """
         return present("plot_dma_fit", self)
+
+
+def check_shifts(path: Path) -> None:
+    """Refuse a file for the table of shifts that has another ending or would be replaced.
+
+    Raises
+    ------
+    ValueError
+        If the name does not end in .csv, or it is that of a file that is no table of shifts.
+    OSError
+        If the folder does not exist.
+    """
+    if path.suffix.lower() != ".csv":
+        raise ValueError(f"{path}: the name of a table of shifts must end in .csv")
+    check_output(path, SHIFTS)
 
 
 def fit_dma(
