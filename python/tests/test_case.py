@@ -342,6 +342,24 @@ def test_long_lists_are_broken_between_values():
     assert asperity.Case.read(text).material.prony_g == np.geomspace(1e5, 1e7, 30).tolist()
 
 
+def test_only_inputs_are_written_over(tmp_path):
+    result = elastic().run(output=tmp_path / "run.h5").path
+    road = asperity.surface.save(tmp_path / "road.h5", np.zeros((4, 4)), lx=1.0)
+    table = tmp_path / "dma.csv"
+    table.write_text("f (Hz),G' (Pa),G'' (Pa)\n")
+    for path, words in ((result, "is the result of a run"), (road, "is a height map"),
+                        (table, "exists and is not an input")):
+        kept = path.read_bytes()
+        with pytest.raises(ValueError, match=f"{path.name}: {words}: name another file"):
+            elastic().write(path)
+        assert path.read_bytes() == kept
+    with pytest.raises(IsADirectoryError, match="is a folder"):
+        elastic().write(tmp_path)
+    for text in ("", "! a rubber\n&material shear_modulus = 1e6 /\n", "&GRID nx = 4 /\n"):
+        (tmp_path / "case.nml").write_text(text)
+        assert asperity.Case.read(elastic().write(tmp_path / "case.nml")) == elastic()
+
+
 def test_read_and_write(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "maps").mkdir()

@@ -474,6 +474,8 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(ValueError, match=r"run\.h5: is the result of a run: name another file"):
         import_topography(tmp_path / "whole.x3p", result)
     assert asperity.open(result).history.rows == 6
+    with pytest.raises(ValueError, match=r"half\.x3p: exists and is not a height map"):
+        import_topography(tmp_path / "whole.x3p", tmp_path / "half.x3p")
 
 
 def command(*words, folder=None):

@@ -175,6 +175,26 @@ def test_a_damaged_state_is_refused(tmp_path):
         sim.save(tmp_path / "nowhere" / "state.h5")
 
 
+def test_a_state_replaces_no_other_file(tmp_path):
+    sim = asperity.Simulation(BASE + SLIDE)
+    sim.advance()
+    road = asperity.surface.save(tmp_path / "road.h5", np.zeros((4, 4)), lx=1.0)
+    (tmp_path / "case.nml").write_text(BASE + SLIDE)
+    (tmp_path / "damaged.h5").write_bytes(road.read_bytes()[:600])
+    result = asperity.run(tmp_path / "case.nml").path
+    for path, words in ((result, "is the result of a run"), (road, "is a height map"),
+                        (tmp_path / "case.nml", "is an input"),
+                        (tmp_path / "damaged.h5", "exists and is not the state")):
+        kept = path.read_bytes()
+        with pytest.raises(ValueError, match=f"{path.name}: {words}.*: name another file"):
+            sim.save(path)
+        assert path.read_bytes() == kept
+    for _ in "twice":
+        assert sim.save(tmp_path / "state.h5").exists()
+    with pytest.raises(ValueError, match=r"state\.h5: is the state of a simulation"):
+        asperity.surface.save(tmp_path / "state.h5", np.zeros((4, 4)), lx=1.0)
+
+
 @pytest.mark.parametrize(("what", "value", "message"), [
     ("pressure", -1.0, "must be positive without adhesion"),
     ("pressure", np.nan, "must be a finite number"),

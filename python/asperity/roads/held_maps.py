@@ -96,7 +96,7 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
          boundary: str | None = None, title: str = "") -> Path:
     """Write heights as the HDF5 file that ``&surface shape = 'file'`` takes.
 
-    A file of that name is replaced, unless it is the result of a run.
+    A height map of that name is replaced; any other file is refused.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def save(path: str | Path, height: ArrayLike, lx: float | None = None, ly: float
     Raises
     ------
     ValueError
-        If heights or lengths are not allowed, or the file is the result of a run.
+        If heights or lengths are not allowed, or the file exists and is no height map.
     OSError
         If it cannot be written.
 

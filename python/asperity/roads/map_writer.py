@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.files import MAP, check_output
 from ..base.library import version
 
 if TYPE_CHECKING:
@@ -22,16 +23,6 @@ __all__ = ["new_map_file", "write_grid", "write_height"]
 
 
 _MORE = 20_000  # bytes that a file takes beside the heights
-
-
-def _is_result(path: Path) -> bool:
-    """Return whether a file is the result of a run, which a map must not replace."""
-    import h5py
-
-    if not path.is_file() or path.stat().st_size < 8 or not h5py.is_hdf5(path):
-        return False
-    with h5py.File(path, "r", locking=False) as file:
-        return "history" in file
 
 
 @contextmanager
@@ -56,18 +47,13 @@ def new_map_file(path: Path, title: str, program: str, size: int) -> Iterator[h5
     Raises
     ------
     ValueError
-        If the path is that of the result of a run.
+        If the path is that of a file that is no height map.
     OSError
         If it cannot be written.
     """
     import h5py
 
-    if not path.parent.is_dir():
-        raise OSError(f"{path}: cannot be written: there is no folder {str(path.parent)!r}")
-    if path.is_dir():
-        raise OSError(f"{path}: is a folder, not a file")
-    if _is_result(path):
-        raise ValueError(f"{path}: is the result of a run: name another file")
+    check_output(path, MAP)
     new = path.with_name(path.name + ".new")
     try:
         with new.open("wb") as empty:

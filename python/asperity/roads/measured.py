@@ -122,7 +122,7 @@ class MeasuredSurface:
     def save(self, path: str | Path) -> Path:
         """Write the HDF5 file that ``&surface shape = 'file'`` takes.
 
-        A file of that name is replaced.
+        A height map of that name is replaced; any other file is refused.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class MeasuredSurface:
         OSError
             If it cannot be written.
         ValueError
-            If a file of this name is the result of a run.
+            If a file of this name is no height map.
         """
         import h5py
 

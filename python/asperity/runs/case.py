@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.files import INPUT, MATERIAL, check_output
 from ..base.presenters import present
 from ..roads.held_maps import keep_beside, map_of_file
 from . import namelists
@@ -211,7 +212,7 @@ class Case(CaseGroups):
         Parameters
         ----------
         path : str or Path
-            The file, NAME.nml.
+            The file, NAME.nml. An older input is replaced; any other file is refused.
 
         Returns
         -------
@@ -222,8 +223,11 @@ class Case(CaseGroups):
         ------
         OSError
             If it cannot be written.
+        ValueError
+            If the file exists and is no input.
         """
         path = Path(path)
+        check_output(path, INPUT, MATERIAL)
         new = self.kept_in(path.parent)
         new._follow(path.parent)
         for old, surface in zip(self["surface"], new["surface"], strict=True):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..base import library
 from ..base.check import number, whole
 from ..base.errors import NotConverged
+from ..base.files import STATE, check_output
 from ..base.names import NamedFields, UnknownNameError, unknown_name
 from ..results.field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 from . import namelists
@@ -310,8 +311,8 @@ class Simulation:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the state to an HDF5 file, from which `resume` continues with the same numbers.
 
-        The file also contains the input, the road and the values that were set. An older file is
-        replaced when the new one is complete.
+        The file also contains the input, the road and the values that were set. An older state is
+        replaced when the new one is complete; any other file is refused.
 
         Parameters
         ----------
@@ -326,16 +327,14 @@ class Simulation:
         Raises
         ------
         ValueError
-            If no row has been computed yet.
+            If no row has been computed yet, or the file exists and is no saved state.
         OSError
             If the file cannot be written.
         """
         if not self._started:
             raise ValueError("there is no state to save before the first row: call advance()")
         path = Path(path)
-        if not path.parent.is_dir():
-            raise FileNotFoundError(f"{path}: cannot be written: there is no folder"
-                                    f" {str(path.parent)!r}")
+        check_output(path, STATE)
         with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
             _save(self._handle, os.fsencode(Path(folder) / "state.h5"))
             state = np.fromfile(Path(folder) / "state.checkpoint.h5", dtype=np.uint8)
