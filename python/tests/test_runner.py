@@ -86,6 +86,39 @@ def test_ctrl_c_and_restart(case, tmp_path, monkeypatch):
         asperity.run(case, output=tmp_path / "none.h5", restart=True)
 
 
+@pytest.mark.parametrize("error", [RuntimeError("mine"), SystemExit(5),
+                                   asperity.NotConverged("a contact of the callback")])
+def test_an_exception_of_the_callback_leaves_a_checkpoint(case, tmp_path, error):
+    whole = asperity.run(case, output=tmp_path / "whole.h5", threads=1)
+
+    def fail(row, sim):
+        if row.step == 5:
+            raise error
+
+    with pytest.raises(type(error)) as raised:
+        asperity.run(case, threads=1, callback=fail)
+    assert raised.value is error
+    stopped = asperity.open(case.with_suffix(".h5"))
+    assert not stopped.finished and stopped.outcome == "stopped after step 5"
+    assert stopped.snapshots.steps[-1] == 5
+    assert case.with_suffix(".xdmf").exists()
+    parts = asperity.run(case, threads=1, restart=True)
+    assert parts.finished
+    for name, column in columns(whole).items():
+        np.testing.assert_array_equal(parts.history[name], column, err_msg=name)
+
+
+def test_an_exception_after_the_last_row_leaves_a_finished_run(case):
+    def fail(row, sim):
+        if row.step == 8:
+            raise RuntimeError("mine")
+
+    with pytest.raises(RuntimeError, match="mine"):
+        asperity.run(case, callback=fail)
+    assert asperity.open(case.with_suffix(".h5")).finished
+    assert not case.with_suffix(".checkpoint.h5").exists()
+
+
 def test_a_running_result_can_be_read(case, monkeypatch):
     rows = []
     step = runner._step

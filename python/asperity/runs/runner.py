@@ -84,8 +84,8 @@ def run(
     callback : callable, optional
         Function ``callback(row, sim)`` that is called after each row. The columns of `row` are
         attributes, and `sim` is a view of the run with ``row``, ``rows`` and ``fields``. If the
-        function returns False, the run ends with a checkpoint, from which ``restart=True``
-        continues. To change the load between rows use `asperity.Simulation`.
+        function returns False or raises an exception, the run ends with a checkpoint, from which
+        ``restart=True`` continues. To change the load between rows use `asperity.Simulation`.
 
     Returns
     -------
@@ -133,34 +133,40 @@ def run(
                                                    int(overwrite))
     except OSError as error:
         raise OSError(_with_arguments(str(error))) from None
-    failure: NotConverged | None = None
+    failure: Exception | None = None
+    finished = first >= rows
     view: RunView | None = None
     stops = _Stops()
     progress = None if quiet else Progress(rows)
     try:
         warn_of(notes)
-        finished = first >= rows
         while not finished and not stops.asked:
-            finished, step, time, area, friction, notes = _step(handle, stops.numbers)
+            try:
+                finished, step, time, area, friction, notes = _step(handle, stops.numbers)
+            except Exception as error:  # the row is incomplete, so that no checkpoint is written
+                failure = error
+                break
             warn_of(notes)
             if step < 0:  # the step was given up
                 break
             if callback is not None:
                 view = view or RunView(handle, rows, _shape(result))
-                if callback(view.row, view) is False and not finished:
+                if callback(view.row, view) is False:
                     break
             if progress is not None:
                 progress.show(step, time, area, friction)
+    except BaseException:  # of the callback, by Ctrl-C, or a warning that is an error
         if not finished:
             _interrupt(handle)
-    except KeyboardInterrupt:
-        _interrupt(handle)
         raise
-    except NotConverged as error:
-        failure = error
+    else:
+        if not finished and failure is None:
+            _interrupt(handle)
     finally:
         _close(handle)
         stops.end()
+    if failure is not None and not isinstance(failure, NotConverged):
+        raise failure
     opened = Run(os.fsdecode(result.rstrip()))
     if failure is not None:
         raise NotConverged(str(failure), opened) from None
