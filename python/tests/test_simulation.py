@@ -233,6 +233,27 @@ def test_advance_after_the_last_row():
     assert repr(sim) == "simulation that is closed"
 
 
+def test_fields_keep_their_simulation():
+    def fields():
+        sim = asperity.Simulation(BASE + SLIDE)
+        sim.advance()
+        return sim.fields
+
+    found = fields()
+    gc.collect()
+    assert found["pressure"].mean() == pytest.approx(0.2e6, rel=1e-4)
+    gc.disable()
+    try:  # the memory is freed at once, without the collector
+        sim = asperity.Simulation(BASE + SLIDE)
+        fields, release = sim.fields, sim._release
+        del sim
+        assert release.alive
+        del fields
+        assert not release.alive
+    finally:
+        gc.enable()
+
+
 def test_many_simulations_one_after_another():
     for _ in range(200):
         asperity.Simulation(BASE + "&phase pressure = 1e5 /\n")

@@ -53,8 +53,9 @@ class _CaseLike(Protocol):
 class _Fields(NamedFields, Mapping[str, NDArray[Any]]):
     """The present fields. Each access returns a new array of shape (ny, nx)."""
 
-    def __init__(self, handle: int, shape: tuple[int, int]) -> None:
+    def __init__(self, handle: int, shape: tuple[int, int], owner: object = None) -> None:
         self._handle, self._shape = handle, shape
+        self._owner = owner  # kept alive, because the fields exist as long as the simulation does
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in FIELDS:
@@ -165,7 +166,6 @@ class Simulation:
     rows: int
     shape: tuple[int, int]
     finished: bool
-    fields: Mapping[str, NDArray[Any]]
 
     def __init__(self, case: str | os.PathLike[str] | _CaseLike, *,
                  threads: int | None = None) -> None:
@@ -181,8 +181,14 @@ class Simulation:
         self.rows, self.shape, self.finished = int(rows), (int(ny), int(nx)), False
         self._lengths = float(lx), float(ly)
         self._started = False
-        self.fields = _Fields(self._handle, self.shape)
         warn_of(notes)
+
+    @property
+    def fields(self) -> Mapping[str, NDArray[Any]]:
+        """The present fields by their names in a snapshot, arrays of shape (ny, nx)."""
+        # They are not an attribute, because they refer to the simulation: the memory of a circle
+        # of references would be freed late.
+        return _Fields(self._handle, self.shape, self)
 
     # --- rows -------------------------------------------------------------------------------
 
