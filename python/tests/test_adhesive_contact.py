@@ -150,6 +150,13 @@ def test_functions_that_are_refused(potential, more, said):
                                 pressure=1e4, **more)
 
 
+@pytest.mark.parametrize("tolerance", [0.0, 1.0, 3])
+def test_a_tolerance_is_between_0_and_1(tolerance):
+    with pytest.raises(ValueError, match=f"tolerance = {tolerance}: must be .* > 0 and < 1"):
+        asperity.solve_adhesive(wavy(), 40e-6, 33e-6, MODULUS, energy=0.05, range=1e-6,
+                                pressure=1e4, tolerance=tolerance)
+
+
 def test_function_without_attraction_is_no_adhesion():
     given = {"pressure": 3e4, "tolerance": 1e-9}
     bare = asperity.solve_normal(wavy(), 40e-6, 33e-6, MODULUS, **given)

@@ -62,8 +62,21 @@ def test_a_written_case_is_complete_without_this_process(tmp_path, program):
     assert asperity.open(moved / "case.h5").finished
 
 
+def test_nested_lists_are_maps():
+    lists = wave().tolist()
+    for surface in (lists, [lists], [lists, dict(shape="sine", amplitude=1e-7, wavelength=1e-3)]):
+        case = asperity.Case(surface=surface)
+        assert (case.grid.ny, case.grid.nx) == wave().shape
+        assert case.surface[0].file == asperity.Case(surface=wave()).surface[0].file
+    for wrong in ([1.0, 2.0], "road.h5", 5):
+        with pytest.raises(ValueError, match=r"must be a dict of variables, or a height map: an"):
+            asperity.Case(surface=wrong)
+    with pytest.raises(ValueError, match=r"&phase: 5: must be a dict of variables$"):
+        asperity.Case(phase=5)
+
+
 @pytest.mark.parametrize("value", [
-    np.array([1.0, np.nan]), np.zeros((2, 2, 2)), np.array([["a"]])])
+    [[1.0, 2.0], [3.0]], np.array([1.0, np.nan]), np.zeros((2, 2, 2)), np.array([["a"]])])
 def test_wrong_kinds_of_maps_are_refused(value):
     with pytest.raises(ValueError, match="surface"):
         asperity.Case(surface=value)

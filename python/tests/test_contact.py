@@ -163,6 +163,7 @@ def test_no_convergence_carries_the_best_result():
     ({"boundary": "open"}, "boundary = 'open': must be one of 'periodic', 'free'"),
     ({"method": "slow"}, "method = 'slow': must be one of 'fast', 'thesis'"),
     ({"tolerance": 0.0}, "tolerance = 0.0"),
+    ({"tolerance": 1}, "tolerance = 1: must be a finite number > 0 and < 1"),
     ({"max_iterations": 0}, "max_iterations = 0: must be a positive integer"),
     ({"start": np.zeros((3, 3))}, r"start: has shape \(3, 3\): must be \(64, 96\)"),
     ({"height": np.zeros((1, 8)), "boundary": "free"}, "must be 'periodic'"),

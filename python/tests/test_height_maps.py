@@ -92,6 +92,9 @@ def test_shapes():
      r"wavelength_rolloff = 0.1: must be at least .* and at most wavelength_long = 0.9$"),
     ({"wavelength_long": float("inf")}, r"wavelength_long = inf: must be a finite number$"),
     ({"generator": "dice"}, r"generator = 'dice': must be one of 'random_phase', 'filtered_noise'"),
+    ({"seed": "a"}, "seed = 'a': must be an integer from -2147483648 to 2147483647"),
+    ({"seed": 1.5}, "seed = 1.5: must be an integer"),
+    ({"seed": 2**31}, "seed = 2147483648: must be an integer"),
     ({"wavelength_short": 0.9, "wavelength_long": 0.95}, "no mode of the grid lies in the band"),
 ])
 def test_wrong_values(changes, message):

@@ -92,7 +92,12 @@ def test_snapshots_and_losses_of_rows_that_were_not_read(tmp_path):
             file[f"losses/{step:06d}/octave"] = np.ones(3)
     run = asperity.open(path)
     assert run.snapshots.steps == (0, 5)
-    assert list(run.losses) == [5]
+    assert list(run.losses) == [5] and 0 not in run.losses and run.losses.get(0) is None
+    with pytest.raises(KeyError, match=r"row 0: has no losses: only rows of steady .* are \[5\]"):
+        run.losses[0]
+    none = asperity.open(frictional_result(tmp_path / "none.h5"))
+    with pytest.raises(KeyError, match=r"row 3: has no losses: .* of which there is none"):
+        none.losses[3]
     assert film(run, tmp_path / "film.gif", "pressure").stat().st_size > 0
 
 

@@ -224,6 +224,27 @@ def test_a_callback_is_checked_before_the_run():
         asperity.run("nowhere.nml", callback=3)
 
 
+def test_a_warning_points_to_the_call(case):
+    case.write_text(SLIDING.replace("velocity_x = 0.05", "velocity_x = 0.5"))
+    with pytest.warns(UserWarning, match="moves the road by") as found:
+        asperity.run(case)
+    assert {warning.filename for warning in found} == {__file__}
+
+
+def test_restart_or_overwrite(case):
+    with pytest.raises(ValueError, match="restart=True and overwrite=True are given together"):
+        asperity.run(case, restart=True, overwrite=True)
+    assert not case.with_suffix(".h5").exists()
+
+
+def test_a_missing_folder_is_named_with_the_result(tmp_path):
+    """The result is named, not the copy of the height map beside it."""
+    held = asperity.Case(grid=dict(lx=1e-3), surface=np.zeros((4, 4)),
+                         material=dict(shear_modulus=1e6), phase=dict(pressure=1e3))
+    with pytest.raises(OSError, match=r"no/x\.h5: cannot be written: there is no folder '.*no'"):
+        asperity.run(held, output=tmp_path / "no" / "x.h5")
+
+
 def test_ragged_heights_are_named():
     with pytest.raises(ValueError, match="height: must be an array of real numbers"):
         asperity.solve_normal([[1.0, 2.0], [3.0]], 1e-3, 1e-3, 1e6, pressure=1e4)

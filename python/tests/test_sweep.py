@@ -231,6 +231,10 @@ def test_wrong_inputs_are_reported_before_anything_runs(tmp_path):
                           (dict(threads=4096), "at most the"), (dict(errors="x"), "errors")]:
         with pytest.raises(ValueError, match=words):
             sweep(wave(), {"grid.nx": [8]}, folder=tmp_path, **options)
+    (tmp_path / "file").touch()
+    for folder in ("file", "file/sweep"):
+        with pytest.raises(OSError, match="file: is a file: the runs need a folder"):
+            sweep(wave(), {"grid.nx": [8]}, folder=tmp_path / folder)
 
 
 def test_maps_and_default_folders(tmp_path, monkeypatch):

@@ -114,8 +114,8 @@ def positives(**values: float) -> tuple[float, ...]:
     return tuple(positive(name, value) for name, value in values.items())
 
 
-def whole(name: str, value: float) -> int:
-    """Return `value` as a positive int of at most 31 bits, which is the library's range.
+def whole(name: str, value: float, low: int = 1) -> int:
+    """Return `value` as an int from `low` to 2^31 - 1, the largest number of the library.
 
     Raises
     ------
@@ -134,8 +134,9 @@ def whole(name: str, value: float) -> int:
     if isinstance(value, np.generic):
         value = value.item()
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or not 1 <= value < 2**31 or int(value) != value:
-        raise ValueError(f"{name} = {shown(value)}: must be a positive integer")
+    if not good or not low <= value < 2**31 or int(value) != value:
+        allowed = "a positive integer" if low == 1 else f"an integer from {low} to {2**31 - 1}"
+        raise ValueError(f"{name} = {shown(value)}: must be {allowed}")
     return int(value)
 
 

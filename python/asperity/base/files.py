@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 __all__ = ["INPUT", "MAP", "MATERIAL", "RESULT", "SHIFTS", "SHIFTS_HEAD", "STATE", "check_folder",
-           "check_output", "kind_of"]
+           "check_output", "kind_of", "make_folder"]
 
 #: Kinds of file that the package and the program write, in the words of messages.
 INPUT = "an input"
@@ -60,6 +60,14 @@ def check_folder(path: Path) -> None:
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: cannot be written: there is no folder"
                                 f" {str(path.parent)!r}")
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of some runs, unless it exists; raise OSError if that is not possible."""
+    place = next(place for place in (folder, *folder.parents) if place.exists())
+    if not place.is_dir():
+        raise NotADirectoryError(f"{place}: is a file: the runs need a folder")
+    folder.mkdir(parents=True, exist_ok=True)
 
 
 def check_output(path: Path, kind: str, *others: str) -> None:

@@ -103,7 +103,7 @@ def solve_adhesive(
     boundary : str
         'periodic' or 'free'.
     tolerance : float
-        Largest allowed residual.
+        Largest allowed residual, above 0 and below 1.
     max_iterations : int
         Largest number of iterations.
     method : str
@@ -157,7 +157,7 @@ def solve_adhesive(
     modulus = positive("modulus", modulus)
     range = positive("range", range)
     name, energy, table = _attraction(potential, energy, range)
-    tolerance = positive("tolerance", tolerance)
+    tolerance = number("tolerance", tolerance, 0.0, 1.0, low_open=True, high_open=True)
     steps = whole("max_iterations", max_iterations)
     thesis = choice("method", method, ("fast", "thesis")) == "thesis"
     if thesis and free:

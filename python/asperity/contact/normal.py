@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import library
-from ..base.check import choice, exactly_one, positive, whole
+from ..base.check import choice, exactly_one, number, positive, whole
 from ..base.errors import NotConverged
 from ..base.presenters import present
 
@@ -113,7 +113,7 @@ def solve_normal(
         'periodic' or 'free'.
     tolerance : float
         Largest allowed duality gap over (load times rms height), and largest relative error of the
-        load.
+        load. Above 0 and below 1.
     max_iterations : int
         Largest number of iterations.
     method : str
@@ -154,7 +154,7 @@ def solve_normal(
     array, lx, ly, free = library.contact_map(height, lx, ly, boundary)
     shape = np.shape(height)
     modulus = positive("modulus", modulus)
-    tolerance = positive("tolerance", tolerance)
+    tolerance = number("tolerance", tolerance, 0.0, 1.0, low_open=True, high_open=True)
     steps = whole("max_iterations", max_iterations)
     control, load = exactly_one(pressure=pressure, force=force, displacement=displacement)
     target = positive(control, load)

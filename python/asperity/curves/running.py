@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..base.files import make_folder
 from ..results import Run, open_result
 from ..roads.patches import Patch
 from ..runs.jobs import Job, found_result, is_done
@@ -90,9 +91,7 @@ def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False,
     SubmittedError
         If the runs were submitted to Slurm.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OSError(f"{folder}: is a file: the runs need a folder")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     renewed = set() if renewed is None else renewed
     patches = [plan.road.patch(number) for number in range(plan.patches)]
     files = [patch.save(folder).name for patch in patches]

@@ -12,7 +12,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.names import NamedValues, OpenValues
+from ..base.check import shown
+from ..base.names import NamedValues, OpenValues, UnknownNameError
 from .history import Grid, History
 from .reading import NotAResultError, attributes_of, read_file, scalar_of, text_of
 
@@ -37,6 +38,15 @@ class Losses(NamedTuple):
     wavelength: FloatArray
     octave: FloatArray
     arm: FloatArray
+
+
+class _LossesOfRows(dict[int, Losses]):
+    """The losses by the number of the row, with a message for rows that have none."""
+
+    def __missing__(self, step: object) -> Losses:
+        known = f"are {shown(list(self))}" if self else "is none"
+        raise UnknownNameError(f"row {step}: has no losses: only rows of steady sliding have"
+                               f" them, of which there {known}")
 
 
 class Material(NamedValues):
@@ -103,9 +113,9 @@ class ResultFile:
                 {name: text_of(columns[name].attrs.get("long_name", name)) for name in names})
             if sums is not None:
                 self._compare(sums[()])
-            self.losses = {int(key): Losses(*(
+            self.losses = _LossesOfRows((int(key), Losses(*(
                 np.asarray(group[name][()]) if name in group else np.zeros(0)
-                for name in Losses._fields)) for key, group in self._of_rows(file, "losses")}
+                for name in Losses._fields))) for key, group in self._of_rows(file, "losses"))
             self._snapshot_keys = [key for key, _ in self._of_rows(file, "snapshots")]
 
         read_file(self.path, read)

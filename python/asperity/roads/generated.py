@@ -174,8 +174,7 @@ def _make(
     height = np.zeros((ny, nx))
     centre_x = nx // 2 * lx / nx if centre_x is None else number("centre_x", centre_x)
     centre_y = ny // 2 * ly / ny if centre_y is None else number("centre_y", centre_y)
-    if not -(2**31) <= seed < 2**31:
-        raise ValueError(f"seed = {seed}: must fit 32 bits")
+    seed = whole("seed", seed, low=-(2**31))
     try:
         _height(lx, ly, library.flag_of_boundary(boundary), name, radius, amplitude, wavelength,
                 hurst, wavelength_long, wavelength_rolloff, wavelength_short, rms_height,

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 import tempfile
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,7 +40,13 @@ _held: dict[Path, HeldMap] = {}
 
 def is_map(value: object) -> bool:
     """Return whether a value is an array or a topography, and not the variables of a group."""
-    return isinstance(value, np.ndarray) or _is_topography(value)
+    return isinstance(value, np.ndarray) or _is_topography(value) or _is_list_of_rows(value)
+
+
+def _is_list_of_rows(value: object) -> bool:
+    """Return whether a value is an array as nested lists of numbers."""
+    return isinstance(value, list | tuple) and bool(value) and all(
+        isinstance(row, list | tuple) and row and isinstance(row[0], Real) for row in value)
 
 
 def _is_topography(value: object) -> bool:

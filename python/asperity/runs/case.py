@@ -55,10 +55,11 @@ class Case(CaseGroups):
         Values of the groups, by name: dicts of variables, or lists of dicts for ``surface`` and
         ``phase``. Values may be NumPy numbers and arrays.
 
-        A surface may also be a height map: an array of shape (ny, nx) in m, in which summits are
-        maxima, or a topography of SurfaceTopography. The grid then gets its numbers of cells, and
-        the lengths of a topography, unless the grid has values of its own. The map is stored in a
-        temporary file; `write` and `run` copy it beside the input or the result.
+        A surface may also be a height map: an array of shape (ny, nx) in m, or nested lists, in
+        which summits are maxima, or a topography of SurfaceTopography. The grid then gets its
+        numbers of cells, and the lengths of a topography, unless the grid has values of its own.
+        The map is stored in a temporary file; `write` and `run` copy it beside the input or the
+        result.
 
         The friction law may be a function that takes an array of pressures, Pa, and returns the
         largest tractions, Pa, in an array of the same shape. It becomes a table for

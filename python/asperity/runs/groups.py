@@ -83,7 +83,8 @@ class Group(MutableMapping[str, Any]):
         object.__setattr__(self, "_entry", entry_of(name))
         object.__setattr__(self, "_values", {})
         if values is not None and not isinstance(values, Mapping):
-            raise ValueError(f"&{name}: {shown(values)}: must be a dict of variables")
+            map_too = ", or a height map: an array of shape (ny, nx)" * (name == "surface")
+            raise ValueError(f"&{name}: {shown(values)}: must be a dict of variables{map_too}")
         if isinstance(values, Group) and values._entry is self._entry:
             self._values.update({name: list(value) if isinstance(value, list) else value
                                  for name, value in values.items()})
@@ -218,7 +219,8 @@ class Groups(MutableSequence[Group]):
 
     def __init__(self, name: str, groups: Iterable[Mapping[str, Any]] = ()) -> None:
         self._name = entry_of(name).name
-        one = isinstance(groups, Mapping) or is_map(groups)
+        one = (isinstance(groups, Mapping | str) or not isinstance(groups, Iterable)
+               or is_map(groups))
         listed: Iterable[Any] = [groups] if one else groups
         self._groups = [self._group(values) for values in listed]
 

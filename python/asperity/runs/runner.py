@@ -15,6 +15,7 @@ import numpy as np
 from ..base import library
 from ..base.check import shown, whole
 from ..base.errors import NotConverged
+from ..base.files import check_folder
 from ..results import Run
 from . import namelists
 from .row import Row
@@ -95,7 +96,8 @@ def run(
     Raises
     ------
     ValueError
-        If the input is wrong. The message lists all faults.
+        If the input is wrong, and the message lists all faults, or if both `restart` and
+        `overwrite` are given.
     OSError
         If a file cannot be read or written, if another run is writing the result, or if the result
         is unfinished and neither `restart` nor `overwrite` is given.
@@ -115,38 +117,54 @@ def run(
     ...
     OSError: nowhere.nml: there is no such file
     """
-    namelists.require_case(case)
-    if callback is not None and not callable(callback):
-        raise TypeError(f"callback = {shown(callback)}: must be a function of a row and the run")
-    if threads is not None:
-        threads = whole("threads", threads)
-    target = b"" if output is None else os.fsencode(output)
-    if output is not None and not 0 < len(target) <= 1024:
-        raise ValueError(f"output: has {len(target)} characters: must have 1 to 1024")
+    threads = _checked(case, output, threads, restart and overwrite, callback)
     if not isinstance(case, str | os.PathLike):
         # A result outlives this process, so height maps that are arrays are copied beside it.
-        case = case.kept_in((Path(output) if output else case.result).parent)
+        place = Path(output) if output else case.result
+        check_folder(place)
+        case = case.kept_in(place.parent)
     path, text = namelists.source(case)
     try:
-        handle, rows, first, result, notes = _open(os.fsencode(path), namelists.encode(text),
-                                                   target, threads or 0, int(restart),
-                                                   int(overwrite))
+        handle, rows, first, result, notes = _open(
+            os.fsencode(path), namelists.encode(text), os.fsencode(output or b""), threads,
+            int(restart), int(overwrite))
     except OSError as error:
         raise OSError(_with_arguments(str(error))) from None
-    failure: Exception | None = None
+    stops = _Stops()
+    try:
+        failure = _do_rows(handle, (first, rows), notes, result, stops, quiet, callback)
+    finally:
+        _close(handle)
+        stops.end()
+    if failure is not None and not isinstance(failure, NotConverged):
+        raise failure
+    opened = Run(os.fsdecode(result.rstrip()))
+    if failure is not None:
+        raise NotConverged(str(failure), opened) from None
+    return opened
+
+
+def _do_rows(handle: int, span: tuple[int, int], notes: bytes, result: bytes, stops: _Stops,
+             quiet: bool, callback: Callable[[Row, RunView], Any] | None) -> Exception | None:
+    """Do the rows of a run that are left, and write a checkpoint if it stops before the last one.
+
+    Returns
+    -------
+    Exception or None
+        The failure of a row. Exceptions of other origin are raised after the checkpoint is written.
+    """
+    first, rows = span
     finished = first >= rows
     view: RunView | None = None
-    stops = _Stops()
     progress = None if quiet else Progress(rows)
     try:
-        warn_of(notes)
+        warn_of(notes, level=4)
         while not finished and not stops.asked:
             try:
                 finished, step, time, area, friction, notes = _step(handle, stops.numbers)
             except Exception as error:  # the row is incomplete, so that no checkpoint is written
-                failure = error
-                break
-            warn_of(notes)
+                return error
+            warn_of(notes, level=4)
             if step < 0:  # the step was given up
                 break
             if callback is not None:
@@ -159,18 +177,22 @@ def run(
         if not finished:
             _interrupt(handle)
         raise
-    else:
-        if not finished and failure is None:
-            _interrupt(handle)
-    finally:
-        _close(handle)
-        stops.end()
-    if failure is not None and not isinstance(failure, NotConverged):
-        raise failure
-    opened = Run(os.fsdecode(result.rstrip()))
-    if failure is not None:
-        raise NotConverged(str(failure), opened) from None
-    return opened
+    if not finished:
+        _interrupt(handle)
+    return None
+
+
+def _checked(case: Any, output: str | os.PathLike[str] | None, threads: int | None, both: bool,
+             callback: object) -> int:
+    """Check the arguments of `run`; return the number of threads, 0 for that of the case."""
+    namelists.require_case(case)
+    if callback is not None and not callable(callback):
+        raise TypeError(f"callback = {shown(callback)}: must be a function of a row and the run")
+    if both:
+        raise ValueError("restart=True and overwrite=True are given together: give one of them")
+    if output is not None and not 0 < (length := len(os.fsencode(output))) <= 1024:
+        raise ValueError(f"output: has {length} characters: must have 1 to 1024")
+    return 0 if threads is None else whole("threads", threads)
 
 
 def _with_arguments(message: str) -> str:

@@ -442,7 +442,7 @@ class _Input:
         return self._text
 
 
-def warn_of(notes: bytes) -> None:
-    """Issue the warnings of the library, one per line, as warnings of Python."""
+def warn_of(notes: bytes, level: int = 3) -> None:
+    """Issue the warnings of the library, one per line, at a level of the stack above this one."""
     for line in notes.decode(errors="replace").strip().splitlines():
-        warnings.warn(line, UserWarning, stacklevel=3)
+        warnings.warn(line, UserWarning, stacklevel=level)

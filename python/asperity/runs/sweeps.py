@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.check import choice
+from ..base.files import make_folder
 from ..results import Run, open_result
 from ..results.steady import steady_mean
 from . import namelists
@@ -142,7 +143,7 @@ def sweep(
             _targets(case, name)
     folder = _folder(case) if folder is None else Path(folder)
     work = _jobs(case, points, folder, keep=errors == "keep")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     _write_index(folder, work)
     waiting = []
     for job in work:
