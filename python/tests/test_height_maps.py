@@ -108,7 +108,16 @@ def test_wrong_shapes():
     with pytest.raises(ValueError, match=r"^radius = .*: must be a positive number$"):
         asperity.surface.shape("sphere", 16, radius=-1.0)
     with pytest.raises(ValueError, match=r"^amplitude = .*: must be finite\nwavelength = "):
-        asperity.surface.shape("sine", 16, amplitude=float("nan"))
+        asperity.surface.shape("sine", 16, amplitude=float("nan"), wavelength=0.0)
+    for name in ("sphere", "paraboloid", "cylinder"):
+        with pytest.raises(ValueError, match=f"^radius: is missing: '{name}' needs it, in m$"):
+            asperity.surface.shape(name, 16, wavelength=1.0, amplitude=1.0)
+    for name in ("sine", "hexagonal_wave"):
+        with pytest.raises(ValueError, match=f"^amplitude: is missing: '{name}' needs it, in m$"):
+            asperity.surface.shape(name, 16, wavelength=1.0)
+        with pytest.raises(ValueError, match=r"^amplitude: is missing: .*\nwavelength: is missing"):
+            asperity.surface.shape(name, 16, radius=1.0)
+    assert not asperity.surface.shape("sine", 16, amplitude=0.0, wavelength=1.0).any()
 
 
 def test_threads():

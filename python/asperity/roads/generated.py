@@ -12,7 +12,9 @@ __all__ = ["self_affine", "shape"]
 
 FloatArray = NDArray[np.float64]
 
-_SHAPES = ("sphere", "paraboloid", "cylinder", "sine", "hexagonal_wave")
+# The lengths that each shape needs.
+_SHAPES = {"sphere": ("radius",), "paraboloid": ("radius",), "cylinder": ("radius",),
+           "sine": ("amplitude", "wavelength"), "hexagonal_wave": ("amplitude", "wavelength")}
 
 _height = library.call("surface_height")
 
@@ -112,9 +114,9 @@ def shape(
     lx: float = 1.0,
     ly: float | None = None,
     *,
-    radius: float = 0.0,
-    amplitude: float = 0.0,
-    wavelength: float = 0.0,
+    radius: float | None = None,
+    amplitude: float | None = None,
+    wavelength: float | None = None,
     centre_x: float | None = None,
     centre_y: float | None = None,
     boundary: str = "periodic",
@@ -131,7 +133,7 @@ def shape(
     lx, ly : float
         Lengths, m; by default `ly` makes the cells square.
     radius, amplitude, wavelength : float
-        Lengths, m.
+        Lengths, m. Those that the shape needs have no default.
     centre_x, centre_y : float, optional
         Position of the summit, m; by default the centre of the middle cell.
     boundary : str
@@ -155,9 +157,15 @@ def shape(
     >>> float(sphere.max())
     0.0
     """
-    choice("name", name, _SHAPES)
-    return _make(nx, nx if ny is None else ny, lx, ly, boundary, name, radius=radius,
-                 amplitude=amplitude, wavelength=wavelength, centre_x=centre_x, centre_y=centre_y)
+    needed = _SHAPES[choice("name", name, tuple(_SHAPES))]
+    given = {"radius": radius, "amplitude": amplitude, "wavelength": wavelength}
+    missing = [f"{length}: is missing: {name!r} needs it, in m" for length in needed
+               if given[length] is None]
+    if missing:
+        raise ValueError("\n".join(missing))
+    return _make(nx, nx if ny is None else ny, lx, ly, boundary, name, radius=radius or 0.0,
+                 amplitude=amplitude or 0.0, wavelength=wavelength or 0.0, centre_x=centre_x,
+                 centre_y=centre_y)
 
 
 def _make(
