@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import sys
 from typing import NamedTuple
 
 import h5py
@@ -664,6 +665,22 @@ def test_files_that_a_fit_does_not_write_are_kept(tmp_path, capsys):
     fit = fit_dma(read_dma(table))
     with pytest.raises(ValueError, match=r"other\.csv: exists and is not a table of shifts"):
         fit.write_shifts(other)
+
+
+def test_a_fit_goes_into_a_pipe_or_along_a_link(command, tmp_path):
+    write(tmp_path / "dma.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
+          sweeps([20.0], np.logspace(-1, 2, 13)))
+    (tmp_path / "link.nml").symlink_to("rubber.nml")
+    for _ in "twice":
+        assert command("dma.csv", "-o", "link.nml").returncode == 0
+    assert (tmp_path / "link.nml").is_symlink()
+    group = (tmp_path / "rubber.nml").read_text()
+    assert group.startswith("! ") and "&material" in group
+    done = subprocess.run([sys.executable, "-m", "asperity", "fit", "dma.csv", "-o", "/dev/stdout"],
+                          cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert group in done.stdout
+    names = {"dma.csv", "link.nml", "rubber.nml"}
+    assert {path.name for path in tmp_path.iterdir()} == names
 
 
 def test_a_fit_that_fails_is_status_4(tmp_path, monkeypatch, capsys):

@@ -1,8 +1,11 @@
 """Pictures are written and show what they should."""
 
 import errno
+import io
+import resource
 import subprocess
 import sys
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 
 import h5py
 import matplotlib.pyplot as plt
@@ -433,6 +436,57 @@ def test_the_legend_lies_off_the_data(frictional):
     assert not axes.title.get_text() or title.y0 >= axes.get_legend().get_window_extent().y1 - 1.0
 
 
+@contextmanager
+def small_disk(size=40):
+    """Let no file become larger than some bytes, so that writing fails half-way."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.gif", "a.html", "a.vti", "a.nml", "fit.nml",
+                                  "fit.csv"])
+def test_a_full_disk_leaves_the_file_of_before(tmp_path, name):
+    """A file that could not be written whole does not exist, or is that of before."""
+    run = asperity.open(frictional_result(tmp_path / "road.h5"))
+    omega = np.logspace(0, 4, 30)
+    modulus = asperity.material.Prony(1e6, [2e6, 3e6], [1e-3, 1e-2]).complex_modulus(omega)
+    (tmp_path / "dma.csv").write_text("f (rad/s),G' (Pa),G'' (Pa),T (C)\n" + "".join(
+        f"{f},{m.real},{m.imag},{t}\n" for t, factor in ((20, 1.0), (30, 5.0))
+        for f, m in zip(omega * factor, modulus, strict=True)))
+    case = asperity.Case(title="Long " * 30, grid=dict(nx=8, ny=8, lx=1.0))
+    target = tmp_path / name
+    command = {"a.png": ["plot", run.path, "-o"], "a.html": ["report", run.path, "-o"],
+               "a.gif": ["plot", run.path, "--film", "pressure", "-o"],
+               "fit.nml": ["fit", tmp_path / "dma.csv", "-o"],
+               "fit.csv": ["fit", tmp_path / "dma.csv", "--shifts"]}.get(name)
+
+    def write():
+        if command is None:
+            return case.write(target) if name == "a.nml" else run.snapshots[-1].to_vtk(target)
+        assert main([*map(str, command), str(target)]) == 0
+
+    files = {path.name for path in tmp_path.iterdir()}
+    for kept in (None, b""):
+        if kept is not None:
+            write()
+            kept = target.read_bytes()
+            assert len(kept) > 40
+        errors = io.StringIO()
+        with small_disk(), redirect_stderr(errors), redirect_stdout(io.StringIO()):
+            if command is None:
+                with pytest.raises(OSError, match=f"{name}: cannot be written: File too large"):
+                    write()
+            else:
+                assert main([*map(str, command), str(target)]) == 3
+                assert f"{name}: cannot be written: File too large\n" in errors.getvalue()
+        assert {path.name for path in tmp_path.iterdir()} == files | ({name} if kept else set())
+        assert not kept or target.read_bytes() == kept
+
+
 def test_a_full_disk_is_reported_with_the_name_of_the_picture(tmp_path, monkeypatch, capsys):
     from matplotlib.figure import Figure
 
@@ -442,5 +496,5 @@ def test_a_full_disk_is_reported_with_the_name_of_the_picture(tmp_path, monkeypa
     frictional_result(tmp_path / "road.h5")
     monkeypatch.setattr(Figure, "savefig", full)
     assert main(["plot", str(tmp_path / "road.h5")]) == 3
-    printed = f"asperity: {tmp_path / 'road.png'}: No space left on device\n"
+    printed = f"asperity: {tmp_path / 'road.png'}: cannot be written: No space left on device\n"
     assert capsys.readouterr().err == printed

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 __all__ = ["INPUT", "MAP", "MATERIAL", "RESULT", "SHIFTS", "SHIFTS_HEAD", "STATE", "check_folder",
-           "check_output", "kind_of", "make_folder"]
+           "check_output", "kind_of", "make_folder", "new_file", "write_text"]
 
 #: Kinds of file that the package and the program write, in the words of messages.
 INPUT = "an input"
@@ -100,3 +103,49 @@ def check_output(path: Path, kind: str, *others: str) -> None:
     if found not in (kind, *others):
         raise ValueError(f"{path}: {f'is {found}' if found else f'exists and is not {kind}'}:"
                          " name another file")
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[Path]:
+    """Give a file its name when it is complete, so that a full disk leaves the file of before.
+
+    Links are followed. A device or a pipe is written to directly.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Yields
+    ------
+    Path
+        Name of a temporary file in the same folder, with the same ending, to be written.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written. The message names the file.
+    """
+    check_folder(path)
+    target = Path(os.path.realpath(path))
+    temporary = target.is_file() or not path.exists()
+    new = target.with_name(f".{target.stem}.{os.getpid()}.new{target.suffix}")
+    try:
+        if path.exists() and not os.access(path, os.W_OK):
+            raise OSError("its permissions do not allow it")
+        yield new if temporary else path
+        if temporary:
+            new.replace(target)
+    except OSError as error:
+        # What is written may itself be given its name by this function.
+        reason = error.strerror or str(error).removeprefix(f"{new}: cannot be written: ")
+        raise OSError(f"{path}: cannot be written: {reason}") from None
+    finally:
+        if temporary:
+            new.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str, encoding: str = "utf-8") -> None:
+    """Write a text file, whose lines end in the way of Unix, by `new_file`."""
+    with new_file(path) as new:
+        new.write_text(text, encoding=encoding, newline="\n")

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..base.files import INPUT, MATERIAL, check_folder, check_output
+from ..base.files import INPUT, MATERIAL, check_folder, check_output, write_text
 
 __all__ = ["add_columns", "add_fit", "add_import", "columns_of"]
 
@@ -191,7 +191,7 @@ def _fit(chosen: argparse.Namespace) -> int:
         print(group)
         messages = sys.stderr  # the standard output then has nothing but the group
     else:
-        output.write_text(group + "\n", encoding="utf-8")
+        write_text(output, group + "\n")
         print(fit.summary())
         print(f"wrote {output}")
     if chosen.shifts is not None:

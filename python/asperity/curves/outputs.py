@@ -14,6 +14,7 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from ..base.files import new_file, write_text
 from .plan import CurvePlan
 
 __all__ = ["check_outputs", "plan_code", "write_output"]
@@ -111,20 +112,11 @@ def write_output(output: Path, folder: Path, code: str, write: Callable[[Path], 
     OSError
         If it cannot be written. A file that was there before is then as it was.
     """
-    target = _target(output)
-    new = target.with_name(f".{target.stem}.new{target.suffix}")
-    try:
+    with new_file(output) as new:
         write(new)
-        new.replace(target)
-    except OSError as error:
-        raise OSError(f"{output}: cannot be written: {error.strerror or error}") from None
-    finally:
-        new.unlink(missing_ok=True)
-    record = _record(folder) | {_key(output, folder): {"plan": code, "sha256": _checksum(target)}}
-    place = folder / _RECORD
-    new = place.with_name(f"{place.name}.new")
-    new.write_text(json.dumps(record, indent=1) + "\n")
-    new.replace(place)
+    record = _record(folder) | {
+        _key(output, folder): {"plan": code, "sha256": _checksum(_target(output))}}
+    write_text(folder / _RECORD, json.dumps(record, indent=1) + "\n")
 
 
 def _record(folder: Path) -> dict[str, dict[str, str]]:

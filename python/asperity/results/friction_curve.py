@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.files import new_file, write_text
 from ..base.optional import needed
 from ..base.presenters import present
 from .curve_remarks import CurveRemark, marks_of
@@ -235,7 +236,7 @@ class FrictionCurve:
         lines = [",".join(COLUMNS)]
         lines += [",".join(repr(value) for value in row) for row in self.rows()]
         path = Path(path)
-        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        write_text(path, "\n".join(lines) + "\n", "ascii")
         return path
 
     def to_xarray(self) -> xarray.Dataset:
@@ -313,7 +314,9 @@ class FrictionCurve:
             If the file cannot be written.
         """
         path = Path(path)
-        self.to_xarray().to_netcdf(path, engine="scipy")
+        data = self.to_xarray()
+        with new_file(path) as new:
+            data.to_netcdf(new, engine="scipy")
         return path
 
     def plot(self) -> Any:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import library
 from ..base.check import positive
+from ..base.files import new_file
 from .instrument_files import to_metres
 from .map_writer import new_map_file, write_grid, write_height
 
@@ -93,9 +94,8 @@ def keep_beside(file: str, folder: Path) -> Path:
     source = Path(file)
     target = folder / source.name
     if not target.exists():
-        new = target.with_name(target.name + ".new")
-        shutil.copyfile(source, new)
-        new.replace(target)
+        with new_file(target) as new:
+            shutil.copyfile(source, new)
     return target
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import number, positive
-from ..base.files import SHIFTS, SHIFTS_HEAD, check_output
+from ..base.files import SHIFTS, SHIFTS_HEAD, check_output, write_text
 from ..base.names import counted
 from ..base.presenters import present
 from .dma_sweeps import Sweep, drift_note, sweeps_of
@@ -178,7 +178,7 @@ class DmaFit:
         lines = [SHIFTS_HEAD]
         lines += [f"{t!r},{shift!r},{10.0**shift!r},{10.0**upward.get(t, 0.0)!r}"
                   for t, shift in self.shifts]
-        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        write_text(path, "\n".join(lines) + "\n", "ascii")
         return path
 
     def plot(self) -> Figure:

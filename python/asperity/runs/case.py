@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.files import INPUT, MATERIAL, check_output
+from ..base.files import INPUT, MATERIAL, check_output, new_file
 from ..base.presenters import present
 from ..roads.held_maps import keep_beside, map_of_file
 from . import namelists
@@ -234,7 +234,8 @@ class Case(CaseGroups):
         for old, surface in zip(self["surface"], new["surface"], strict=True):
             if map_of_file(old.file) is not None:
                 surface.file = Path(surface.file).name
-        path.write_bytes(namelists.encode(str(new)))
+        with new_file(path) as file:
+            file.write_bytes(namelists.encode(str(new)))
         object.__setattr__(self, "_groups", new._groups)
         self.path = path
         return path

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..base import library
 from ..base.check import number, whole
 from ..base.errors import NotConverged
-from ..base.files import STATE, check_output
+from ..base.files import STATE, check_output, new_file
 from ..base.names import NamedFields, UnknownNameError, unknown_name
 from ..results.field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 from . import namelists
@@ -344,18 +344,13 @@ class Simulation:
         with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
             _save(self._handle, os.fsencode(Path(folder) / "state.h5"))
             state = np.fromfile(Path(folder) / "state.checkpoint.h5", dtype=np.uint8)
-        new = path.with_name(f".{path.name}.{os.getpid()}.new")
-        try:
-            with h5py.File(new, "w") as file:
-                file.attrs["kind"] = "state of an asperity.Simulation"
-                file.attrs["version"] = library.version()
-                file.attrs["input"] = self._text
-                file.attrs["input_path"] = str(Path(self._path).absolute())
-                file.attrs["steered"] = json.dumps(self._steered)
-                file["state"] = state
-            new.replace(path)
-        finally:
-            new.unlink(missing_ok=True)
+        with new_file(path) as new, h5py.File(new, "w") as file:
+            file.attrs["kind"] = "state of an asperity.Simulation"
+            file.attrs["version"] = library.version()
+            file.attrs["input"] = self._text
+            file.attrs["input_path"] = str(Path(self._path).absolute())
+            file.attrs["steered"] = json.dumps(self._steered)
+            file["state"] = state
         return path
 
     @classmethod

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.files import write_text
 from ..base.library import version
 from ..base.names import counted
 from ..results import open_result
@@ -55,7 +56,7 @@ def write_curve_page(curve: FrictionCurve, path: str | Path) -> Path:
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"{target}: the name of a page must end in .html")
-    target.write_text(curve_page(curve), encoding="utf-8", newline="\n")
+    write_text(target, curve_page(curve))
     return target
 
 

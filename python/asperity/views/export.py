@@ -12,6 +12,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.files import write_text
 from ..base.optional import needed
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def to_vtk(snapshot: Snapshot, path: str | os.PathLike[str]) -> Path:
         f'<Piece Extent="{extent}">',
         f"<CellData Scalars={quoteattr(shown)}>", *arrays, "</CellData>",
         "</Piece>", "</ImageData>", "</VTKFile>", ""])
-    target.write_text(text, encoding="ascii", newline="\n")
+    write_text(target, text, "ascii")
     return target
 
 

@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from PIL.Image import Dither, Image, Quantize
 
+from ..base.files import new_file
 from ..results.settings import has_friction
 from ..results.steady import steady_speeds
 from .colour_scales import field_style, mark_scale, state_style, without_open_cells
@@ -95,7 +96,8 @@ def film(run: Run, path: Path, field: str | None = None, *,
         writer = _GifWriter(64 if field == "contact" else 256, **speed)
     with print_style():
         animation, figure = _animation(run, field)
-        animation.save(path, writer=writer, dpi=110)
+        with new_file(path) as new:
+            animation.save(new, writer=writer, dpi=110)
         plt.close(figure)
     return path
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.files import write_text
 from ..base.library import version
 from ..base.names import counted
 from ..results.settings import has_friction, solver_setting
@@ -66,7 +67,7 @@ def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
     if target.suffix.lower() not in (".html", ".htm") and not target.is_dir():
         raise ValueError(f"{target}: the name of a page must end in .html")
     text = report_page(run)
-    target.write_text(text, encoding="utf-8", newline="\n")
+    write_text(target, text)
     return target
 
 

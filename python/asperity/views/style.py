@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.files import new_file
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.typing import RcKeyType
@@ -99,11 +101,9 @@ def check_picture(path: Path | None) -> None:
 
 
 def save_picture(figure: Figure, path: Path, dpi: int) -> None:
-    """Write a figure. Where that fails, the message names the file, as on a full disk."""
-    try:
-        figure.savefig(path, dpi=dpi)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
+    """Write a figure."""
+    with new_file(path) as new:
+        figure.savefig(new, dpi=dpi)
 
 
 def si_scale(values: ArrayLike, units: str) -> tuple[float, str]:
