@@ -3,6 +3,7 @@
 import subprocess
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -124,5 +125,8 @@ def test_saved_arrays(tmp_path, program):
     with pytest.raises(OSError, match="there is no folder"):
         asperity.surface.save(tmp_path / "no" / "road.h5", wave(), 1.0)
     run = asperity.run(tmp_path / "case.nml")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["surface"] = np.zeros((3, 3))
+    assert asperity.surface.save(tmp_path / "other.h5", wave(), 1.0).exists()
     with pytest.raises(ValueError, match="is the result of a run"):
         asperity.surface.save(run.path, wave(), 1.0)

@@ -44,7 +44,7 @@ def kind_of(path: Path) -> str:
         try:
             with h5py.File(path, "r", locking=False) as file:
                 found = {RESULT: "history" in file, STATE: "steered" in file.attrs,
-                         MAP: "surface/height" in file}
+                         MAP: "surface" in file}
         except OSError:  # the file is damaged
             return ""
         return next((kind for kind, holds in found.items() if holds), "")
