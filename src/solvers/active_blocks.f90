@@ -175,46 +175,20 @@ contains
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
       logical, intent(in) :: far                   !! with the far rim
-      logical, allocatable :: holds(:, :), stretched(:, :)
-      integer :: b, j, k, first, last, n, rows, blocks, rim(2)
-      logical :: now, before
+      logical, allocatable :: used(:, :)
+      integer :: b, j, k, first, last, n
+      logical :: before
 
-      blocks = size(self%live, 1)
-      rows = size(self%wide_runs)
-      allocate (holds(blocks, rows), stretched(blocks, rows))
-      !$omp parallel do default(none) shared(self, holds, rows) private(j, k) num_threads(self%threads)
-      do j = 1, rows
-         holds(:, j) = .false.
-         if (j < self%strips(1) .or. j > self%strips(2)) cycle
-         do k = self%first_y(j), self%first_y(j + 1) - 1
-            holds(:, j) = holds(:, j) .or. self%live(:, k)
-         end do
-      end do
-      ! The rim of a block may reach rows of other processes.
-      holds(:, :) = on_any_process(holds)
-      rim = merge(self%far_rim, self%rim, far)
-      !$omp parallel default(none) shared(self, holds, stretched, blocks, rows, rim) private(b, j) &
+      call find_used_blocks(self, merge(self%far_rim, self%rim, far), used)
+      !$omp parallel do default(none) shared(self, search, used) private(b, j, k, first, last, n, before) &
       !$omp num_threads(self%threads)
-      !$omp do
-      do j = 1, rows
-         stretched(:, j) = dilated(holds(:, j), rim(1))
-      end do
-      !$omp end do
-      !$omp do
-      do b = 1, blocks
-         holds(b, :) = dilated(stretched(b, :), rim(2))
-      end do
-      !$omp end parallel
-      !$omp parallel do default(none) shared(self, search, holds, blocks) &
-      !$omp private(b, j, k, first, last, n, now, before) num_threads(self%threads)
       do j = self%strips(1), self%strips(2)
          n = 0
          before = .false.
-         do b = 1, blocks
-            now = holds(b, j)
+         do b = 1, size(used, 1)
             first = (b - 1)*width + 1
             last = min(b*width, self%nx)
-            if (now) then
+            if (used(b, j)) then
                if (.not. before) then
                   n = n + 1
                   self%wide_first(n, j) = first
@@ -225,37 +199,68 @@ contains
                   search(first:last, k) = 0.0_sp
                end do
             end if
-            self%wide(b, j) = now
-            before = now
+            self%wide(b, j) = used(b, j)
+            before = used(b, j)
          end do
          self%wide_runs(j) = n
       end do
-
-   contains
-
-      !> The blocks of a line that are set, or are close enough to one that is.
-      pure function dilated(line, distance)
-         logical, intent(in) :: line(:)
-         integer, intent(in) :: distance
-         logical :: dilated(size(line))
-         integer :: b, k, turns, left, right, length
-
-         ! The blocks since the last one that is set, in both directions; a periodic line is passed twice.
-         dilated = line
-         length = size(line)
-         turns = merge(2, 1, self%periodic)
-         left = distance
-         right = distance
-         do k = 1, turns*length
-            b = 1 + modulo(k - 1, length)
-            left = merge(0, left + 1, line(b))
-            if (left <= distance) dilated(b) = .true.
-            b = length + 1 - b
-            right = merge(0, right + 1, line(b))
-            if (right <= distance) dilated(b) = .true.
-         end do
-      end function dilated
-
    end subroutine list_wide_runs
+
+   !> Find the wide blocks that hold an active block or lie in its rim, on all processes. Collective.
+   subroutine find_used_blocks(self, rim, used)
+      type(active_blocks_type), intent(in) :: self
+      integer, intent(in) :: rim(2)                    !! in blocks along x and wide rows along y
+      logical, allocatable, intent(out) :: used(:, :)  !! [blocks, wide rows]
+      logical, allocatable :: stretched(:, :)
+      integer :: b, j, k
+
+      allocate (used, mold=self%wide)
+      allocate (stretched, mold=self%wide)
+      !$omp parallel do default(none) shared(self, used) private(j, k) num_threads(self%threads)
+      do j = 1, size(used, 2)
+         used(:, j) = .false.
+         if (j < self%strips(1) .or. j > self%strips(2)) cycle
+         do k = self%first_y(j), self%first_y(j + 1) - 1
+            used(:, j) = used(:, j) .or. self%live(:, k)
+         end do
+      end do
+      ! The rim of a block may reach rows of other processes.
+      used(:, :) = on_any_process(used)
+      !$omp parallel default(none) shared(self, used, stretched, rim) private(b, j) num_threads(self%threads)
+      !$omp do
+      do j = 1, size(used, 2)
+         stretched(:, j) = dilated(used(:, j), rim(1), self%periodic)
+      end do
+      !$omp end do
+      !$omp do
+      do b = 1, size(used, 1)
+         used(b, :) = dilated(stretched(b, :), rim(2), self%periodic)
+      end do
+      !$omp end parallel
+   end subroutine find_used_blocks
+
+   !> The blocks of a line that are set, or are close enough to one that is.
+   pure function dilated(line, distance, periodic)
+      logical, intent(in) :: line(:)
+      integer, intent(in) :: distance
+      logical, intent(in) :: periodic              !! the line is closed
+      logical :: dilated(size(line))
+      integer :: b, k, turns, left, right, length
+
+      ! The blocks since the last one that is set, in both directions; a periodic line is passed twice.
+      dilated = line
+      length = size(line)
+      turns = merge(2, 1, periodic)
+      left = distance
+      right = distance
+      do k = 1, turns*length
+         b = 1 + modulo(k - 1, length)
+         left = merge(0, left + 1, line(b))
+         if (left <= distance) dilated(b) = .true.
+         b = length + 1 - b
+         right = merge(0, right + 1, line(b))
+         if (right <= distance) dilated(b) = .true.
+      end do
+   end function dilated
 
 end module active_blocks
