@@ -183,7 +183,7 @@ contains
       type(clip_type), intent(out) :: clip
       type(trial_sums_type), allocatable :: rows(:)
       type(trial_sums_type) :: above
-      real(dp) :: kept, next, cells
+      real(dp) :: kept, next
       logical :: first                               !! the sum may be too small
       integer :: j, k, n
 
@@ -193,18 +193,13 @@ contains
       above = sums
       kept = load
       next = 0.0_dp
-      cells = 0.0_dp
       first = self%preconditioner%released
       do
          if (above%cells < 1.0_dp) exit                   ! too far: the shift before is the best one
          clip%shift = next
          kept = above%above
          if (kept - load <= 1e-15_dp*load .and. .not. first) exit
-         ! With the same cells above as before, the sum is linear in the shift. The last step was exact, and the rest is
-         ! round-off.
-         if (above%cells == cells) exit
-         cells = above%cells
-         next = clip%shift + (kept - load)/cells
+         next = clip%shift + (kept - load)/above%cells
          if (next <= clip%shift .and. .not. first) exit  ! the limit of round-off is reached
          first = .false.
          !$omp parallel do default(none) shared(self, step, next, rows) private(j, k, n) &
