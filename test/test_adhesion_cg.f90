@@ -8,6 +8,7 @@ module test_adhesion_cg
       new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type, control_approach, control_pressure, &
       reason_closed, reason_detached
+   use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_symbols, only : adhesion_symbols_type
    use check, only : begin_suite, check_close, check_error, check_no_error, check_order, &
       check_that, selected
@@ -16,6 +17,7 @@ module test_adhesion_cg
    use asperity_threads, only : set_threads
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, pi
+   use row_sharing, only : row_sharing_type
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use transform_shape, only : whole_shape
    implicit none
@@ -59,8 +61,38 @@ contains
       if (selected('pull_off_takes_more_work_than_approach')) &
          call pull_off_takes_more_work_than_approach()
       if (selected('detached_closed_and_refused')) call detached_closed_and_refused()
+      if (selected('round_off_of_the_energy_is_no_rise')) call round_off_of_the_energy_is_no_rise()
       if (selected('same_bits_on_two_threads')) call same_bits_on_two_threads()
    end subroutine run_adhesion_cg
+
+   !> Near the solution the gain of a step is far below the round-off of the energy, a sum over all cells. The whole step
+   !> must be taken nevertheless if the slope vanishes at its end.
+   subroutine round_off_of_the_energy_is_no_rise()
+      integer, parameter :: n = 300
+      type(adhesion_problem_type) :: problem
+      type(step_sums_type) :: known, rows(n)
+      type(row_sharing_type) :: sharing
+      real(dp) :: gap(n, n), step(n, n), no_pressure(n), least
+      integer :: i, j, k
+
+      problem%potential = potential_of('exponential', 1.0_dp, 1.0_dp)
+      no_pressure = 0.0_dp
+      least = 1.0_dp
+      do k = 1, 50
+         do j = 1, n
+            do i = 1, n
+               gap(i, j) = 1.0_dp + sin(real(k*i + 3*j*j, dp))
+               step(i, j) = 1e-10_dp*sin(real(7*i*j + k, dp))
+            end do
+            call form_step_row(problem, gap(:, j), no_pressure, step(:, j), rows(j))
+         end do
+         known = known_of_step(rows, sharing)
+         known%form = 2.0_dp*abs(known%curvature)
+         known%slope = -(known%form + known%curvature)
+         least = min(least, choose_step(known, problem, gap, step, 1))
+      end do
+      call check_order(least, '>=', 1.0_dp, 'a step that gains less than round-off is taken')
+   end subroutine round_off_of_the_energy_is_no_rise
 
    !> Energy of adhesion gamma_0 for the range z_0, in units of E* = 1 and of the length of the cell.
    function potential_of(name, energy, range) result(potential)

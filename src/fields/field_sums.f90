@@ -318,7 +318,8 @@ contains
       integer :: j
 
       allocate (rows(size(condition, 2)))
-      !$omp parallel do default(none) shared(condition, rows) private(j)
+      !$omp parallel do default(none) shared(condition, rows) private(j) &
+      !$omp num_threads(merge(1, thread_count(), size(condition) < small))
       do j = 1, size(condition, 2)
          rows(j) = count(condition(:, j))
       end do

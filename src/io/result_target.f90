@@ -84,7 +84,7 @@ contains
    subroutine check_replaced(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
-      character(:), allocatable :: checkpoint
+      character(:), allocatable :: checkpoint, way_on
 
       if (allocated(error)) return
       checkpoint = checkpoint_path(path)
@@ -100,13 +100,9 @@ contains
                'it, or choose another --output')
             return
          case (is_unfinished)
-            if (file_exists(checkpoint)) then
-               call fail(error, error_file, path//': holds an unfinished run: --restart continues it'// &
-                  ' from its last checkpoint, --overwrite replaces it, or choose another --output')
-            else
-               call fail(error, error_file, path//': holds an unfinished run, and there is no checkpoint: '// &
-                  '--overwrite starts again, or choose another --output')
-            end if
+            way_on = ': --restart continues it from its last checkpoint, --overwrite replaces it'
+            if (.not. file_exists(checkpoint)) way_on = ', and there is no checkpoint: --overwrite starts again'
+            call fail(error, error_file, path//': holds an unfinished run'//way_on//', or choose another --output')
             return
          end select
       end if
