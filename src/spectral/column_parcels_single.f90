@@ -9,6 +9,6 @@ module column_parcels_single
 
    public :: column_parcels_type, new_column_parcels
 
-   include 'column_parcels.inc'      ! state 9370a34a, written by tools/check_sources.py --update
+   include 'column_parcels.inc'      ! state 7f7c0bd3, written by tools/check_sources.py --update
 
 end module column_parcels_single
