@@ -205,6 +205,9 @@ contains
       call parse_case(body//'&solver precision = ''mixed'', method = ''thesis'' /', 'a', case, error)
       call check_error(error, 'precision', 'mixed precision of the thesis''s method')
       call check_error(error, 'thesis', 'mixed precision of the thesis''s method')
+      call parse_case('&grid nx = 16, ny = 16, lx = 1e-3, boundary = ''free'' /'//sphere//steel//press// &
+         '&adhesion potential = ''gauss'', energy = 0.05, range = 1e-8 /&solver method = ''thesis'' /', 'a', case, error)
+      call check_error(error, 'with &adhesion needs boundary = ''periodic''', 'the thesis''s method with adhesion')
       if (allocated(error)) call check_that(error%status == error_input, 'its status')
    end subroutine options_that_exclude_each_other
 
@@ -432,6 +435,8 @@ contains
          'rms_height and rms_slope are given together')
       call refuse(no_surface//'&surface shape = ''self_affine'', hurst=0.8, rms_slope=0.1, '// &
          'wavelength_short=1e-3, wavelength_rolloff=1e-4 /', 'must be at most wavelength_rolloff')
+      call refuse(no_surface//'&surface shape = ''self_affine'', hurst=0.8, rms_slope=0.1, '// &
+         'wavelength_short=0.9e-3, wavelength_long=0.95e-3 /', 'no wave that fits the grid is between')
       call refuse(no_surface//'&surface shape = ''file'' /', 'file: is missing')
       call refuse(no_surface, '&surface: the group is missing')
 

@@ -22,7 +22,7 @@ module flat_simulations
    implicit none
    private
 
-   public :: simulation_close, simulation_load, simulation_open, simulation_save, &
+   public :: simulation_close, simulation_load, simulation_open, simulation_progress, simulation_save, &
       simulation_steer, simulation_step
 
 contains
@@ -122,6 +122,26 @@ contains
       end if
       call report(error, status, message)
    end subroutine simulation_step
+
+   !> How far a simulation has come. Ctrl-C may arrive when a row has just ended, so that its caller does not know.
+   subroutine simulation_progress(handle, started, finished, status, message)
+      integer(c_int), intent(in) :: handle
+      integer(c_int), intent(out) :: started               !! 1: there is a row
+      integer(c_int), intent(out) :: finished              !! 1: no row is left, or the last one did not converge
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(driven_type), pointer :: driven
+
+      started = 0
+      finished = 0
+      call find_driven(int(handle), driven, error)
+      if (.not. allocated(error)) then
+         started = merge(1, 0, driven%sim%state%schedule%row >= 0)
+         finished = merge(1, 0, driven%sim%finished .or. .not. driven%sim%converged)
+      end if
+      call report(error, status, message)
+   end subroutine simulation_progress
 
    !> Set a load, the velocity or the temperature from the next row on.
    subroutine simulation_steer(handle, what, first, second, status, message)

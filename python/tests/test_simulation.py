@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import asperity
+from asperity.runs import simulation
 
 pytestmark = pytest.mark.filterwarnings("ignore:&")
 
@@ -132,6 +133,44 @@ def test_a_temperature_that_is_set_shifts_the_relaxation_times(tmp_path):
     assert cold[-1].displacement < 0.999 * warm[-1].displacement
 
 
+STEADY = "&phase steady = .true., pressure = 0.2e6, velocity_x = 0.1 /\n"
+
+
+@pytest.mark.parametrize("laws", ["", FRICTION])
+def test_a_temperature_that_is_set_holds_for_steady_states(tmp_path, laws):
+    sim = asperity.Simulation(BASE + laws + 3 * STEADY)
+    rows = [sim.advance()]
+    sim.temperature = 40.0
+    rows += list(sim)
+    reference = ended(BASE.replace("wlf_c1", "temperature = 40., wlf_c1") + laws + STEADY, tmp_path)
+    for row in rows[1:]:
+        assert row.friction_viscous == pytest.approx(reference["friction_viscous"][0], rel=1e-4)
+        assert row.contact_area == reference["contact_area"][0]
+    assert rows[0].contact_area < 0.99 * rows[1].contact_area
+
+
+def test_a_displacement_cannot_be_set_for_a_steady_state():
+    sim = asperity.Simulation(BASE + 2 * STEADY)
+    first = sim.advance()
+    sim.displacement = 1e-6
+    with pytest.raises(ValueError, match="the next row is the steady state of phase 2"):
+        sim.advance()
+    assert columns([sim.row]) == columns([first])
+    sim.pressure = 0.2e6
+    assert sim.advance().pressure == pytest.approx(0.2e6)
+
+
+def test_a_load_that_is_set_to_its_present_value_changes_nothing():
+    text = BASE + "&phase pressure = 0.2e6, velocity_x = 1.0, duration = 8e-5, steps = 8 /\n"
+    sim = asperity.Simulation(text)
+    rows = []
+    while not sim.finished:
+        sim.pressure = 0.2e6
+        rows.append(sim.advance())
+    for name, values in columns(list(asperity.Simulation(text))).items():
+        assert np.array_equal(values, columns(rows)[name]), name
+
+
 def test_a_saved_state_continues_with_the_same_numbers(tmp_path):
     def new():
         sim = asperity.Simulation(BASE + FRICTION + SLIDE)
@@ -154,6 +193,38 @@ def test_a_saved_state_continues_with_the_same_numbers(tmp_path):
         assert np.array_equal(values, columns(rest)[name]), name
     for name in again.fields:
         assert np.array_equal(again.fields[name], straight.fields[name]), name
+
+
+def test_a_saved_state_has_the_road_under_the_surface_that_friction_has_moved(tmp_path):
+    sim = asperity.Simulation(BASE + FRICTION + SLIDE)
+    for _ in range(6):
+        sim.advance()
+    sim.save(tmp_path / "state.h5")
+    again = asperity.Simulation.resume(tmp_path / "state.h5")
+    assert np.abs(again.fields.height - sim.fields.height).max() < 1e-9 * np.ptp(sim.fields.height)
+    # The slip of the last row is not part of a state.
+    assert np.abs(sim.fields["slip_x"]).max() > 0
+    assert np.isnan(again.fields["slip_x"]).all()
+    again.advance()
+    assert np.isfinite(again.fields["slip_x"]).all()
+
+
+def test_a_row_that_was_complete_when_ctrl_c_came_is_not_lost(monkeypatch):
+    step = simulation._step
+
+    def late(handle):
+        step(handle)
+        raise KeyboardInterrupt
+
+    phases = "&phase pressure = 0.2e6, duration = 2e-5, steps = 2 /\n"
+    reference = list(asperity.Simulation(BASE + phases))
+    sim = asperity.Simulation(BASE + phases)
+    monkeypatch.setattr(simulation, "_step", late)
+    for row in reference:
+        with pytest.raises(KeyboardInterrupt):
+            sim.advance()
+        assert columns([sim.row]) == columns([row])
+    assert sim.finished
 
 
 def test_a_damaged_state_is_refused(tmp_path):

@@ -303,6 +303,21 @@ def test_the_advice_on_rows_without_a_solution(tmp_path, law, message):
         asperity.run(case, output=tmp_path / "case.h5")
 
 
+def test_a_road_that_wedges_leaves_numbers_even_if_the_state_overflows(tmp_path):
+    text = """&grid nx = 12, ny = 1, lx = 1e-3 /
+&surface shape = 'sine', amplitude = 6e-5, wavelength = 1e-3 /
+&material shear_modulus = 1e3, prony_g = 1e6, prony_tau = 1e-3 /
+&friction law = 'coulomb', coefficient = 3 /
+&phase steady = .true., pressure = 1e7, velocity_x = 0.01 /
+"""
+    with pytest.raises(asperity.NotConverged, match="the road wedges"):
+        asperity.run(text, output=tmp_path / "wedged.h5", quiet=True)
+    run = asperity.open(tmp_path / "wedged.h5")
+    assert all(np.isfinite(run.history[name]).all() for name in run.history)
+    assert np.isfinite(run.snapshots[-1].traction_x).all()
+    assert run.history["residual_tangential"][0] > 1
+
+
 def flat_topped(nx: int, ny: int) -> np.ndarray:
     """Return a random road with flat tops, which touch under hardly any displacement."""
     rng = np.random.default_rng(7)

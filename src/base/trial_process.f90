@@ -28,6 +28,8 @@ module trial_process
    !> SIGILL, SIGABRT, SIGBUS (Linux), SIGFPE, SIGBUS (macOS), SIGSEGV, SIGALRM, SIGTERM, SIGINT.
    integer(c_int), parameter :: signals(9) = [4, 6, 7, 8, 10, 11, 14, 15, 2]
 
+   integer, parameter :: crashes(5) = [4, 5, 6, 8, 11]         !! SIGILL, SIGTRAP, SIGABRT, SIGFPE, SIGSEGV
+
    !> A trial.
    type :: trial_type
       integer(c_int), private :: process = -1                  !! number of the copy, in this process
@@ -98,7 +100,8 @@ contains
       if (self%is_copy) call c_exit_at_once(0_c_int)
    end subroutine leave
 
-   !> Wait for the copy. An error is set if it crashed or did not end in time.
+   !> Wait for the copy. An error is set if it crashed or did not end in time. A copy that another signal has ended, such
+   !> as the SIGINT of Ctrl-C, which goes to all processes of a terminal, says nothing about the file.
    subroutine verdict(self, path, error)
       class(trial_type), intent(inout) :: self
       character(*), intent(in) :: path                         !! of the file that was tried
@@ -117,10 +120,18 @@ contains
       if (found < 0 .or. number == 0) return
       if (number == alarm_signal) then
          call fail(error, error_file, path//': the file is damaged: reading it does not end')
-      else
+      else if (any(number == crashes) .or. number == bus_signal()) then
          call fail(error, error_file, path//': the file is damaged: HDF5 crashes when it reads it '// &
             '(signal '//to_text(number)//')')
       end if
    end subroutine verdict
+
+   !> The number of SIGBUS.
+   integer function bus_signal()
+      logical :: on_linux
+
+      inquire (file='/proc/self/status', exist=on_linux)
+      bus_signal = merge(7, 10, on_linux)                      ! 10 is SIGUSR1 on Linux
+   end function bus_signal
 
 end module trial_process

@@ -249,7 +249,7 @@ contains
       integer :: k
 
       if (self%phase > size(phases)) return
-      if (self%entered) then
+      if (self%entered .and. .not. holds(phases(self%phase), control, load)) then
          self%load_changed = .true.
          ! The rate of the old quantity cannot be compared with that of the new one.
          if (phases(self%phase)%control /= control) self%held_rate = huge(1.0_dp)
@@ -261,6 +261,16 @@ contains
          phases(k)%linear = .false.
       end do
    end subroutine change_load
+
+   !> Does a phase hold this load already? The load that was reached differs from it by round-off, which must not count
+   !> as a change.
+   pure logical function holds(phase, control, load)
+      type(phase_settings_type), intent(in) :: phase
+      character(*), intent(in) :: control
+      real(dp), intent(in) :: load                 !! Pa, N or m
+
+      holds = phase%control == control .and. .not. phase%linear .and. .not. abs(phase%target - load) > 0.0_dp
+   end function holds
 
    !> Let the road move with another velocity from the last row on, in the present and all later phases.
    subroutine change_velocity(self, phases, velocity, road)

@@ -307,6 +307,9 @@ contains
       if (case%solver%method == 'thesis' .and. case%solver%precision == 'mixed') &
          call group%fault('precision', 'needs method = ''fast''; ''thesis'' works in double precision', &
          faults)
+      if (case%solver%method == 'thesis' .and. case%adhesion%potential /= 'none' .and. &
+         case%grid%boundary == boundary_free) call group%fault('method', &
+         'with &adhesion needs boundary = ''periodic''; ''fast'' serves both', faults)
    end subroutine resolve_solver
 
    !> Resolve the group `&output`.

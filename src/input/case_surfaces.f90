@@ -6,6 +6,7 @@ module case_surfaces
    use input_group, only : group_values_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
+   use surface_self_affine, only : has_modes
    use surface_shapes, only : find_shape, shape_type
    use text_tools, only : to_text
    implicit none
@@ -67,7 +68,7 @@ contains
       term%line = group%line
 
       call check_belonging(group, find_shape(term%shape), faults)
-      if (term%shape == 'self_affine') call check_rough(group, term, grid_known, faults)
+      if (term%shape == 'self_affine') call check_rough(group, term, grid, grid_known, faults)
       if (term%shape == 'file') call resolve_path(group, path, term%file, faults)
    end subroutine resolve_surface
 
@@ -93,9 +94,10 @@ contains
    end subroutine check_belonging
 
    !> Check that the parameters of a rough surface agree with each other.
-   subroutine check_rough(group, term, grid_known, faults)
+   subroutine check_rough(group, term, grid, grid_known, faults)
       type(group_values_type), intent(in) :: group
       type(surface_settings_type), intent(in) :: term
+      type(grid_type), intent(in) :: grid
       logical, intent(in) :: grid_known                !! the defaults are known
       type(faults_type), intent(inout) :: faults
       logical :: long_known, rolloff_known, short_known
@@ -116,6 +118,12 @@ contains
       if (rolloff_known .and. long_known) then
          if (term%wavelength_rolloff > term%wavelength_long) call group%fault('wavelength_rolloff', &
             'must be at most wavelength_long = '//to_text(term%wavelength_long), faults)
+      end if
+      if (grid_known .and. long_known .and. short_known) then
+         if (term%wavelength_short <= term%wavelength_long .and. .not. has_modes(grid, term)) &
+            call group%fault('wavelength_short', 'no wave that fits the grid is between wavelength_short and '// &
+            'wavelength_long = '//to_text(term%wavelength_long)// &
+            ' m long: give a longer wavelength_long, or a finer grid', faults)
       end if
 
    contains

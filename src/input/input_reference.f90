@@ -203,7 +203,8 @@ contains
          row('friction', 'table_pressure', kind_reals, '(required)', 'Pa', 'not negative', &
             'Pressures of the points of a table, which begin at 0 and rise; straight lines join the points.'), &
          row('friction', 'table_strength', kind_reals, '(required)', 'Pa', 'not negative', &
-            'Bounds of the traction at these pressures.'), &
+            'Bounds of the traction at these pressures. Beyond the last point the last line continues if it rises; '// &
+            'otherwise the bound stays constant.'), &
          row('friction', 'slope_effect', kind_logical, '.true.', '', 'any', &
             'Apply the friction law on the true local slope of the road.')]
    end function interface_laws
@@ -259,7 +260,7 @@ contains
          row('solver', 'tolerance', kind_real, '1e-6', '', '(0, 1)', 'Largest allowed residual of every solve.'), &
          row('solver', 'max_iterations', kind_integer, '1000', '', 'positive', 'Largest number of iterations of a solve.'), &
          row('solver', 'method', kind_word, '''fast''', '', '''fast'' | ''thesis''', &
-            'The default algorithms, or those of the thesis.'), &
+            'The default algorithms, or those of the thesis, which with &adhesion need boundary = ''periodic''.'), &
          row('solver', 'time_scheme', kind_word, '''exponential2''', '', &
             '''exponential2'' | ''exponential'' | ''backward_euler''', 'Time integration of the Prony arms.'), &
          row('solver', 'passes', kind_integer, '0', '', 'not negative', &

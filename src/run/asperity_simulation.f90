@@ -12,7 +12,7 @@
 !> friction in passes, and module `row_account` fills the row of the history.
 module asperity_simulation
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use asperity_errors, only : error_type
+   use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp, int64
    use asperity_schedule, only : next_row, planned_row_type
    use asperity_surface, only : new_height
@@ -133,8 +133,22 @@ contains
       class(simulation_type), intent(inout) :: self
 
       call place_road(self, self%state%row%road_x, self%state%row%road_y)
+      if (self%rubs()) call find_heights(self)
+      self%slip_known = .not. self%frictional
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine resume
+
+   !> Find the heights of the road under a surface that friction has moved, from the displacement and the gap.
+   subroutine find_heights(self)
+      class(simulation_type), intent(inout) :: self
+      integer :: j
+
+      if (self%state%steady%now .or. .not. allocated(self%state%displacement)) return
+      !$omp parallel do default(none) shared(self) private(j)
+      do j = 1, self%grid%rows()
+         self%height(:, j) = self%state%displacement(:, j) - self%state%gap(:, j) - self%state%level
+      end do
+   end subroutine find_heights
 
    !> Do the next row. If the solvers do not converge, the state that they have reached is kept. After a row that
    !> was abandoned (`stop%given_up`) the state is that of the row before.
@@ -157,6 +171,8 @@ contains
       type(part_sums_type) :: sums
       integer :: k
 
+      call check_control(self, error)
+      if (allocated(error)) return
       call plan_row(self, plan, parts)
       if (self%finished) return
       if (size(parts) > 1) call self%stop%keep_more(self%state)
@@ -173,10 +189,25 @@ contains
          if (.not. self%converged) exit
       end do
       if (size(parts) > 1) call sums%put_into(self%state%row, self%tangential%slip)
+      self%slip_known = .true.
       call watch_cells(self, plan, self%warnings)
       call check_finite(self)
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine do_row
+
+   !> Refuse a row of steady sliding under a prescribed displacement. The input cannot ask for it, but a load that a caller
+   !> has set between two rows can.
+   subroutine check_control(self, error)
+      type(simulation_type), intent(in) :: self
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (now => self%state%schedule, phases => self%case%phases)
+         if (now%phase > size(phases) .or. now%entered) return
+         if (phases(now%phase)%steady .and. phases(now%phase)%control == 'displacement') &
+            call fail(error, error_input, 'displacement: the next row is the steady state of phase '//to_text(now%phase)// &
+            ', for which the displacement cannot be prescribed: set pressure or force')
+      end associate
+   end subroutine check_control
 
    !> Plan the next row of the schedule, and the parts in which its step is taken.
    subroutine plan_row(self, plan, parts)

@@ -194,13 +194,13 @@ contains
 
    !> Stop between two steps: write a snapshot of the present state, and a checkpoint. A restart removes a
    !> snapshot that was not due, so that the result equals that of a run that never stopped. After a row that was
-   !> abandoned there is no snapshot, because the slip and the road are not part of the state.
+   !> abandoned, or a restart without a new row, there is no snapshot, because the slip is not part of the state.
    subroutine interrupt_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
       if (self%sim%state%row%step > self%last_snapshot .and. self%sim%state%schedule%row >= 0 .and. &
-         .not. self%sim%stop%given_up) call snapshot(self, error, at_stop=.true.)
+         self%sim%slip_known .and. .not. self%sim%stop%given_up) call snapshot(self, error, at_stop=.true.)
       if (self%sim%state%schedule%row < 0) then
          call self%files%write_outcome('stopped before the first row', error)
       else

@@ -1,6 +1,7 @@
 !> The fields of a contact under the names that they have in a result. A few rows are copied at a time, never a
 !> whole field. Row numbers are those of this process.
 module contact_fields
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use asperity_precision, only : dp, int8
    use contact_model, only : contact_type
    use contact_rule, only : touches
@@ -43,9 +44,23 @@ contains
          c = merge(1, 2, index(name, '_x') > 0)
          if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, first:last)
          if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, first:last)
-         if (index(name, 'slip') == 1) values = self%tangential%slip(:, c, first:last)
+         if (index(name, 'slip') == 1) values = slip_rows(self, c, first, last)
       end select
    end subroutine field_rows
+
+   !> Some rows of the slip. It is not part of the state: it is not a number in a state that was saved or returned to,
+   !> until the next row.
+   function slip_rows(self, component, first, last) result(values)
+      class(contact_type), intent(in) :: self
+      integer, intent(in) :: component, first, last
+      real(dp) :: values(self%grid%nx, last - first + 1)
+
+      if (self%slip_known) then
+         values = self%tangential%slip(:, component, first:last)
+      else
+         values = ieee_value(1.0_dp, ieee_quiet_nan)
+      end if
+   end function slip_rows
 
    !> Copy some rows of the contact record: 0 open, 1 stick, 2 slip. Without friction all cells in contact slip; with
    !> friction they all stick until the road moves.

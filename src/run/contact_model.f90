@@ -56,6 +56,7 @@ module contact_model
       real(dp) :: rms_slope = 0.0_dp                !! of the original map, -
       logical :: slides = .false.                   !! the road moves in some phase, or may be moved
       logical :: frictional = .false.               !! there is a friction law, and the road moves
+      logical :: slip_known = .true.                !! the slip is that of the last row
    contains
       procedure :: rubs
       procedure :: holds

@@ -85,6 +85,7 @@ contains
          material%temperature = temperature
          material%prony_tau = factor*start_tau
          sim%material%tau = factor*start_tau
+         if (sim%has_steady) sim%steady%medium%tau = factor*start_tau
       end associate
 
    contains

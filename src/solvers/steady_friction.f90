@@ -25,6 +25,7 @@
 !> Memory beside the caller's fields, in fields of doubles: 21, 60 for the acceleration of the rounds, and 8 for that of
 !> the normal solver.
 module steady_friction
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use anderson, only : anderson_type, new_anderson
    use field_sums, only : field_count, field_mean, field_sum, ratio_of_lengths, row_total
    use friction_law, only : friction_law_type
@@ -95,7 +96,7 @@ contains
       type(pace_type) :: pace
       real(dp) :: change, largest
       integer(int64) :: before
-      logical :: determined
+      logical :: determined, overflows
 
       before = operator%ffts
       self%operator => operator
@@ -120,8 +121,9 @@ contains
             if (outcome%converged()) exit
             pace%accepted = 0.5_dp*pace%accepted
          end if
-         if (outcome%tangential%iterations >= self%task%max_iterations) then
-            call give_up(self, pace, contact, outcome)
+         overflows = .not. (ieee_is_finite(change) .and. ieee_is_finite(measure%change))
+         if (overflows .or. outcome%tangential%iterations >= self%task%max_iterations) then
+            call give_up(self, pace, overflows, contact, outcome)
             exit
          end if
 
@@ -237,19 +239,47 @@ contains
       call self%keep(outcome%residual(), contact, pace%best)
    end subroutine keep_best
 
-   !> End the rounds after the largest number, with the best contact and the reason why there may be no solution.
-   subroutine give_up(self, pace, contact, outcome)
+   !> End the rounds, after the largest number or because the state has overflowed, with the best contact and the reason why
+   !> there may be no solution. If the state overflowed before any contact was kept, the best one is that without friction.
+   subroutine give_up(self, pace, overflows, contact, outcome)
       class(steady_friction_type), intent(inout) :: self
       type(pace_type), intent(in) :: pace
+      logical, intent(in) :: overflows                 !! the present contact is not finite
       type(steady_contact_type), intent(inout) :: contact
       type(sliding_outcome_type), intent(inout) :: outcome
+      type(solver_result_type) :: start
 
       outcome%normal%reason = reason_iterations
       outcome%tangential%reason = reason_iterations
-      call complete(self, contact, outcome)
-      call self%return_to_best(pace%best, contact, outcome)
+      if (overflows) then
+         outcome%tangential%residual = huge(1.0_dp)
+      else
+         call complete(self, contact, outcome)
+      end if
+      if (overflows .and. pace%best >= huge(1.0_dp)) then
+         call without_friction(self, contact, start)
+         outcome%normal%stopped = start%stopped
+         if (start%stopped) return
+         call self%judge(contact, outcome)
+      else
+         call self%return_to_best(pace%best, contact, outcome)
+      end if
       call explain(contact, self%law, outcome)
    end subroutine give_up
+
+   !> The contact without friction, with the traction of full sliding under its pressure.
+   subroutine without_friction(self, contact, start)
+      class(steady_friction_type), intent(inout) :: self
+      type(steady_contact_type), intent(inout) :: contact
+      type(solver_result_type), intent(out) :: start
+
+      call shifted(self%road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
+      call contact_without_friction(self%normal, self%operator, self%task, self%direction, contact, start)
+      if (start%stopped) return
+      call ratio_of_sliding(self%law, self%direction, self%ratio)
+      call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, self%ratio, &
+         contact%slip, contact%traction)
+   end subroutine without_friction
 
    !> Solve all cells at once, starting from the present contact, from the best one, or from that without friction,
    !> because on steep roads the best one may be far from the solution. If this fails, the rounds continue unchanged.
@@ -267,13 +297,9 @@ contains
       call complete(self, contact, outcome)
       if (pace%attempt /= from_here) call self%return_to_best(pace%best, contact, outcome)
       if (pace%attempt == along_path .or. pace%attempt == along_second_path) then
-         call shifted(self%road, self%base(1), self%base(2), contact%height, contact%slope_x, contact%slope_y)
-         call contact_without_friction(self%normal, self%operator, self%task, self%direction, contact, start)
+         call without_friction(self, contact, start)
          outcome%normal%stopped = start%stopped
          if (outcome%normal%stopped) return
-         call ratio_of_sliding(self%law, self%direction, self%ratio)
-         call bound_tractions(self%law, self%c, contact%pressure, contact%slope_x, contact%slope_y, self%ratio, &
-            contact%slip, contact%traction)
       end if
       self%joint%direction = self%direction
       self%joint%base = self%base

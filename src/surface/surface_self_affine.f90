@@ -27,12 +27,13 @@ module surface_self_affine
    use regular_grid, only : grid_type
    use row_column_double, only : block, multiplier_type, new_row_column, row_column_type
    use surface_settings, only : surface_settings_type
+   use text_tools, only : to_text
    use transform_shape, only : shape_on_grid, transform_shape_type
    use wave_vectors, only : is_nyquist, mode_number, wave_number
    implicit none
    private
 
-   public :: add_self_affine, self_affine_psd
+   public :: add_self_affine, has_modes, self_affine_psd
 
    !> A mode whose wave number differs from an end of the band by less than this, relatively,
    !> belongs to the band.
@@ -122,6 +123,27 @@ contains
       if (max(abs(k_x), abs(k_y)) > 4.0_dp*pi/term%wavelength_short) return
       a = sqrt(self_affine_psd(term, hypot(k_x, k_y), grid%ny == 1))
    end function amplitude
+
+   !> Does any mode of the grid lie in the band? Of the modes with the same wave number along x, those that are just longer
+   !> or shorter than the long end of the band decide.
+   pure logical function has_modes(grid, term)
+      type(grid_type), intent(in) :: grid
+      type(surface_settings_type), intent(in) :: term
+      real(dp) :: k_x, along_y
+      integer :: i, j, first
+
+      has_modes = .true.
+      do i = 1, grid%nx/2 + 1
+         k_x = wave_number(i, grid%nx, grid%lx)
+         along_y = sqrt(max((2.0_dp*pi/term%wavelength_long)**2 - k_x**2, 0.0_dp))*grid%ly/(2.0_dp*pi)
+         if (along_y > grid%ny) cycle
+         first = int(along_y)
+         do j = max(first, 1), min(first + 3, grid%ny/2 + 1)
+            if (amplitude(grid, term, i, j) > 0.0_dp) return
+         end do
+      end do
+      has_modes = .false.
+   end function has_modes
 
    !> White noise: standard normal numbers on all cells, transformed row by row.
    subroutine add_noise(grid, seed, threads, transform)
@@ -225,11 +247,10 @@ contains
    pure function no_modes(term) result(message)
       type(surface_settings_type), intent(in) :: term
       character(:), allocatable :: message
-      character(200) :: text
 
-      write (text, '(2(a, es10.3), a)') '&surface: wavelength_short = ', term%wavelength_short, &
-         ' m, wavelength_long = ', term%wavelength_long, ' m: no mode of the grid lies in the band'
-      message = trim(text)//': give a longer wavelength_long, or a finer grid'
+      message = '&surface: wavelength_short = '//to_text(term%wavelength_short)//' m, wavelength_long = '// &
+         to_text(term%wavelength_long)//' m: no mode of the grid lies in the band: '// &
+         'give a longer wavelength_long, or a finer grid'
    end function no_modes
 
 end module surface_self_affine

@@ -28,6 +28,7 @@ __all__ = ["FIELDS", "RunView", "Simulation"]
 
 _open = library.call("simulation_open")
 _step = library.call("simulation_step", interruptible=True)
+_progress = library.call("simulation_progress")
 _steer = library.call("simulation_steer")
 _save = library.call("simulation_save")
 _load = library.call("simulation_load")
@@ -208,7 +209,8 @@ class Simulation:
             If a solver does not converge. Its ``result`` is this simulation in the state that was
             reached.
         KeyboardInterrupt
-            If Ctrl-C interrupts the row. The simulation is then where it was before the row.
+            If Ctrl-C interrupts the row. The simulation is then where it was before the row, or
+            after it if the row was just complete: `row` is the last complete one.
         """
         if self.finished:
             raise ValueError("the simulation is finished: no row is left")
@@ -217,6 +219,9 @@ class Simulation:
         except NotConverged as error:
             self._started = self.finished = True
             raise NotConverged(str(error), self) from None
+        except KeyboardInterrupt:
+            self._started, self.finished = map(bool, _progress(self._handle))
+            raise
         self._started = True
         self.finished = bool(finished)
         warn_of(notes)
