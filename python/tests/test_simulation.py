@@ -283,7 +283,7 @@ def test_set_what_the_case_does_not_have():
     sim = asperity.Simulation(elastic + "&phase pressure = 1e5 /\n")
     with pytest.raises(ValueError, match="the material is elastic"):
         sim.temperature = 30.0
-    with pytest.raises(ValueError, match="no phase of the case has a duration"):
+    with pytest.raises(ValueError, match="no phase of the case has a duration or moves it"):
         sim.velocity = (1.0, 0.0)
     with pytest.raises(ValueError, match="needs wlf_c1"):
         asperity.Simulation(BASE.replace("wlf_c1 = 8., wlf_c2 = 120.", "") + SLIDE

@@ -46,8 +46,8 @@ contains
          call fail(error, error_input, 'velocity = ('//to_text(velocity(1))//', '// &
             to_text(velocity(2))//'): must be two finite numbers')
       else if (.not. sim%slides) then
-         call fail(error, error_input, 'velocity: no phase of the case has a duration, so the road '// &
-            'cannot move')
+         call fail(error, error_input, 'velocity: the road cannot move, because no phase of the case '// &
+            'has a duration or moves it')
       else
          call change_velocity(sim%state%schedule, sim%case%phases, velocity, &
             [sim%state%row%road_x, sim%state%row%road_y])

@@ -232,11 +232,15 @@ contains
       integer, intent(in) :: n
       real(dp), intent(in) :: pressure(n), step(n)
       real(dp), intent(inout) :: longest
+      real(dp) :: fastest
       integer :: i
 
+      fastest = tiny(1.0_dp)
+      !$omp simd reduction(max:fastest)
       do i = 1, n
-         if (step(i) < 0.0_dp) longest = min(longest, -pressure(i)/step(i))
+         fastest = max(fastest, -step(i)/max(pressure(i), tiny(1.0_dp)))
       end do
+      longest = min(longest, 1.0_dp/fastest)
    end subroutine longest_cells
 
    !> 1 if x > 0 and 0 otherwise, without a branch.
