@@ -25,7 +25,7 @@ import asperity
 from asperity.__main__ import main
 from asperity.curves import CurvePlan, plan_curve, run_curve
 from asperity.curves.running import SubmittedError
-from asperity.curves.sources import compound_of, road_of
+from asperity.curves.sources import _road_source, compound_of, road_of
 from asperity.material import WLF, Prony
 from asperity.results.curve_remarks import CurveRemark
 from asperity.results.friction_curve import COLUMNS, interval
@@ -682,6 +682,23 @@ def test_from_an_instrument_and_a_messy_table_to_numbers(tmp_path, monkeypatch, 
     found = next(row for row in rows if row["temperature"] == "30.0" and row["speed"] == "0.01")
     assert float(found["friction_persson"]) == pytest.approx(float(exact.friction), rel=0.25)
     assert float(found["friction"]) == pytest.approx(float(found["friction_persson"]), rel=0.35)
+
+
+def test_a_periodic_map_is_the_road_as_it_is(tmp_path):
+    """Without its best plane a periodic map would jump at its edges; other maps lose the plane."""
+    pytest.importorskip("SurfaceTopography")
+    height = asperity.surface.self_affine(48, lx=1e-3, wavelength_long=4e-4, wavelength_short=2e-4,
+                                          rms_slope=0.1, seed=5)
+    height += 2e-5 * np.sin(2 * np.pi * np.arange(48) / 48)
+    for boundary in ("periodic", "free"):
+        asperity.surface.save(tmp_path / f"{boundary}.h5", height, 1e-3, boundary=boundary)
+    made = road_of([tmp_path / "periodic.h5"], cells=48)
+    assert made.join == "none"
+    np.testing.assert_allclose(made.patch(0).height, height - height.mean(), atol=1e-12)
+    assert road_of([tmp_path / "periodic.h5"], cells=48, level="tilt").join == "seam"
+    kinds = {boundary: [step["kind"] for step in _road_source(tmp_path / f"{boundary}.h5", {}).steps
+                        if step["step"] == "level"] for boundary in ("periodic", "free")}
+    assert kinds == {"periodic": ["mean"], "free": ["tilt"]}
 
 
 def test_the_measured_band_of_the_rubber():

@@ -277,6 +277,28 @@ def test_levelling(tmp_path):
     assert not any("tilt" in note for note in load(tmp_path / "plane.nc", level="tilt").notes)
 
 
+def test_a_periodic_map_without_its_plane_is_not_periodic(tmp_path):
+    """The plane differs at opposite edges: a note gives the jump, and the mean is harmless."""
+    j, i = np.mgrid[0:NY, 0:NX]
+    wave = np.sin(2 * np.pi * i / NX) + np.cos(2 * np.pi * j / NY)
+    topography(wave, periodic=True).to_netcdf(str(tmp_path / "map.nc"))
+    for level, kind in (("mean", "mean"), (None, "mean")):
+        kept = load(tmp_path / "map.nc", level=level)
+        assert kept.periodic and not kept.notes
+        assert [step["kind"] for step in kept.steps if step["step"] == "level"] == [kind]
+    for level in ("tilt", "curvature"):
+        found = load(tmp_path / "map.nc", level=level)
+        assert not found.periodic and "boundary = 'free'" in found.to_namelist("s.h5")
+        taken = 1e-6 * wave - found.height
+        jump = 1e6 * np.abs(taken[:, -1] - taken[:, 0]).max()
+        assert f"differ by up to {jump:.3g} um: it is not periodic any more" in found.notes[0]
+    windowed = load(tmp_path / "map.nc", level="tilt", periodic="tukey")
+    assert windowed.periodic and "not periodic any more" not in windowed.notes[0]
+    topography(wave + 0.5 * i).to_netcdf(str(tmp_path / "free.nc"))
+    free = load(tmp_path / "free.nc", level=None)
+    assert [step["kind"] for step in free.steps if step["step"] == "level"] == ["tilt"]
+
+
 def test_levelling_ignores_missing_points(tmp_path):
     """The plane is fitted to the valid points, wherever the others are."""
     j, i = np.mgrid[0:NY, 0:NX]

@@ -118,7 +118,8 @@ def friction_curve(
     jobs, threads, resume, executor, slurm, quiet
         See `asperity.sweep`. By default there are as many runs at a time as processors.
     **options
-        Options of `asperity.surface.load`, such as `unit` and `size`.
+        Options of `asperity.surface.load`, such as `unit` and `size`. By default maps that are not
+        periodic lose their mean plane (`level`).
 
     Returns
     -------

@@ -68,7 +68,7 @@ def road_of(
         Draw random maps from the combined spectrum of the maps, instead of cutting patches.
     **options
         Options of `asperity.surface.load`, which count for all files; the options of a single file
-        take precedence.
+        take precedence. By default maps that are not periodic lose their mean plane (`level`).
 
     Returns
     -------
@@ -214,7 +214,8 @@ def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[
                          " as 'self_affine:...', a MeasuredSurface or a Spectrum; an array becomes"
                          " a file with asperity.surface.save")
     file, own = _own_options(words)
-    return load(file, **{"level": "tilt", **options, **own})
+    # Without its mean plane a periodic map would jump at its edges: only the others lose the plane.
+    return load(file, **{"level": None, **options, **own})
 
 
 def _self_affine(words: str) -> Spectrum:

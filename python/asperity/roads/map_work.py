@@ -70,10 +70,14 @@ class MapWork:
             self.sizes[1] = self.sizes[0] / self.height.shape[1]
         self.note("crop", kept=kept, nx=self.height.shape[1], ny=self.height.shape[0])
 
-    def level(self, kind: str) -> None:
-        """Subtract the polynomial that fits the points best."""
+    def level(self, kind: str) -> float | None:
+        """Subtract the polynomial that fits the points best.
+
+        A periodic map is not periodic any more without a plane or a paraboloid. The largest
+        difference that this makes between opposite edges is returned, and None otherwise.
+        """
         if kind == "none":
-            return
+            return None
         valid = np.isfinite(self.height)
         if not valid.any():
             raise ValueError("the map has no valid point")
@@ -82,6 +86,12 @@ class MapWork:
         for coefficient, term in zip(fit, basis, strict=True):
             self.height = self.height - coefficient * term
         self.note("level", kind=kind, coefficients=dict(zip(names, map(float, fit), strict=True)))
+        if kind == "mean" or not self.periodic:
+            return None
+        taken = np.asarray(sum(c * term for c, term in zip(fit, basis, strict=True)))
+        self.periodic = False
+        return float(max(np.abs(taken[:, -1] - taken[:, 0]).max(),
+                         np.abs(taken[-1] - taken[0]).max()))
 
     def fill(self, most: float, name: str) -> None:
         """Replace missing points by a harmonic surface: each is the mean of its neighbours."""

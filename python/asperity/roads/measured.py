@@ -171,7 +171,7 @@ def load(
     size: float | Sequence[float] | None = None,
     transpose: bool = False,
     crop: Sequence[float] | None = None,
-    level: str = "mean",
+    level: str | None = "mean",
     max_missing: float = 0.1,
     invert: bool = False,
     scale: float = 1.0,
@@ -200,9 +200,11 @@ def load(
     crop : (x0, x1, y0, y1), optional
         Part to keep, in the file's unit, measured from the corner of the first cell; (x0, x1) for a
         line scan.
-    level : str
+    level : str, optional
         'none', or what is subtracted: 'mean' the mean, 'tilt' the plane, 'curvature' the paraboloid
-        that fits best (least squares over the points that are not missing).
+        that fits best (least squares over the points that are not missing). A periodic map is not
+        periodic any more without its plane or paraboloid. None is 'mean' for a periodic map and
+        'tilt' for any other.
     max_missing : float
         Largest share of missing points that is accepted, 0 to 1.
     invert : bool
@@ -241,7 +243,8 @@ def load(
     >>> road = asperity.surface.load("plate.x3p", level="tilt", periodic="tukey")  # doctest: +SKIP
     >>> road.save("surface.h5")                                            # doctest: +SKIP
     """
-    choice("level", level, LEVELS)
+    if level is not None:
+        choice("level", level, LEVELS)
     number("max_missing", max_missing, 0.0, 1.0)
     number("scale", scale)
     if scale == 0.0:
@@ -261,7 +264,8 @@ def load(
         work.note("transpose")
     if crop is not None:
         work.crop(crop)
-    work.level(level)
+    level = level or ("mean" if work.periodic else "tilt")
+    jump = work.level(level)
     work.fill(max_missing, path.name)
     if invert:
         work.height = -work.height
@@ -280,7 +284,7 @@ def load(
     # Lengths that a file sums over cells contain rounding errors: twelve digits are significant.
     lx, ly = (float(f"{to_metres(length, unit):.12g}") for length in work.sizes)
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
-                           _advice(work, level))
+                           [*_jump_note(jump, level, unit, work.periodic), *_advice(work, level)])
 
 
 def import_topography(
@@ -334,6 +338,17 @@ def step_in_words(step: dict[str, Any]) -> str:
         "unit": lambda s: f"lengths and heights from {s['unit']} to m",
     }
     return words[step["step"]](step)
+
+
+def _jump_note(jump: float | None, level: str, unit: str, windowed: bool) -> list[str]:
+    """Return a note on the jump that levelling has made at the edges of a periodic map."""
+    if jump is None:
+        return []
+    what = "plane" if level == "tilt" else "paraboloid"
+    return [f"the file says that the map is periodic, but without its {what} opposite edges differ"
+            f" by up to {jump:.3g} {unit}"
+            + ("" if windowed else ": it is not periodic any more")
+            + "; level = 'mean' (--level mean) keeps it periodic"]
 
 
 def _advice(work: MapWork, level: str) -> list[str]:
