@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import array_of, positive
+from .profile_fit import isotropic_fit
 
 __all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "spectrum_of_map"]
 
@@ -22,6 +23,7 @@ FloatArray = NDArray[np.float64]
 _PER_DECADE = 20        # bands of a measured spectrum per decade
 _WAVES_IN_MAP = 3.0     # periods within the map of the longest wave that a scan measures reliably
 _CELLS_IN_WAVE = 6.0    # cells within the shortest such wave
+_ROUND_OFF = 1e-16      # share of the largest density times k^2 below which a density is round-off
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,8 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     """Return the spectrum of a measured map, for the wavelengths that it measures reliably.
 
     These are from a third of the shorter length down to six cells. A map that is not periodic is
-    first levelled and weighted by Hann's window.
+    first levelled and weighted by Hann's window. For a profile the spectrum of its isotropic road
+    is fitted (`asperity.roads.profile_fit`).
 
     Parameters
     ----------
@@ -206,6 +209,11 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     Returns
     -------
     Spectrum
+
+    Raises
+    ------
+    ValueError
+        If the map is flat, is too small, or has roughness of a single wavelength in this range.
     """
     ny, nx = height.shape
     weights = np.ones_like(height)
@@ -217,8 +225,14 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
     if ny == 1:
         # The density Phi1 of the profile satisfies mean(h^2) = int Phi1 dk/pi over k > 0.
-        k, psd = _banded(kx[1:], power[0, 1:] * lx, lx, lx / nx, name)
-        return isotropic_of_profile(k, psd, name=name)
+        density = power[0] * lx
+        low, high = _reliable(density[1:], lx, lx / nx, name)
+        slope = density * kx**2
+        inside = (kx >= low * (1 - 1e-12)) & (kx <= high * (1 + 1e-12))
+        kept = inside & (slope > _ROUND_OFF * slope.max())
+        if np.count_nonzero(kept) < 2:
+            raise _too_few(int(np.count_nonzero(inside)), lx, lx / nx, name)
+        return Spectrum(*isotropic_fit(kx[kept], density[kept], not periodic), name)
     ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
     k = np.hypot(kx, ky[:, None]).ravel()[1:]
     k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny), name)
@@ -342,18 +356,33 @@ def _hann(count: int) -> FloatArray:
     return 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
 
 
-def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float, name: str
-            ) -> tuple[FloatArray, FloatArray]:
-    """Return the means over bands of equal ratio, within the reliable range of wavelengths."""
+def _reliable(psd: FloatArray, length: float, cell: float, name: str) -> tuple[float, float]:
+    """Return the wave numbers between which a scan measures reliably."""
     if not np.any(psd > 0.0):
         raise ValueError(f"{name}: is flat: must have roughness")
     low = 2.0 * math.pi * _WAVES_IN_MAP / length
     high = 2.0 * math.pi / (_CELLS_IN_WAVE * cell)
-    small = ValueError(f"{name}: is too small for a spectrum: its shorter side of {length:.4g} m"
-                       f" has {length / cell:.0f} cells, and only waves between six cells and a"
-                       " third of the side are measured reliably")
     if not low < high:
-        raise small
+        raise _too_few(0, length, cell, name)
+    return low, high
+
+
+def _too_few(places: int, length: float, cell: float, name: str) -> ValueError:
+    """Return the error of a scan with too few reliable waves, or with roughness in too few."""
+    if places < 2:
+        return ValueError(f"{name}: is too small for a spectrum: its shorter side of {length:.4g} m"
+                          f" has {length / cell:.0f} cells, and only waves between six cells and a"
+                          " third of the side are measured reliably")
+    return ValueError(f"{name}: has roughness of a single wavelength, or of none, between"
+                      f" {_CELLS_IN_WAVE * cell:.4g} m (six cells) and {length / _WAVES_IN_MAP:.4g}"
+                      " m (a third of the shorter side): must have several waves there, because"
+                      " only these are measured reliably")
+
+
+def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float, name: str
+            ) -> tuple[FloatArray, FloatArray]:
+    """Return the means over bands of equal ratio, within the reliable range of wavelengths."""
+    low, high = _reliable(psd, length, cell, name)
     count = max(2, math.ceil(_PER_DECADE * math.log10(high / low)))
     edges = np.geomspace(low, high, count + 1)
     band = np.searchsorted(edges, k, side="right") - 1
@@ -363,8 +392,7 @@ def _banded(k: FloatArray, psd: FloatArray, length: float, cell: float, name: st
     sums = np.bincount(band[inside], psd[inside], count)
     middle = np.exp(waves / np.maximum(modes, 1))
     slope = sums * middle**2
-    # Values far below all others are round-off of the Fourier transform.
-    kept = (modes > 0) & (slope > 1e-16 * slope.max())
+    kept = (modes > 0) & (slope > _ROUND_OFF * slope.max())
     if np.count_nonzero(kept) < 2:
-        raise small
+        raise _too_few(int(np.count_nonzero(modes)), length, cell, name)
     return middle[kept], sums[kept] / modes[kept]
