@@ -297,6 +297,14 @@ def test_scans_are_joined_within_their_ranges():
     np.testing.assert_allclose(apart.at(k), whole.at(k), rtol=1e-6)
 
 
+def test_joined_scans_have_the_mean_of_their_densities():
+    """The density of one mode is distributed exponentially; the mean of its logarithm is -0.58."""
+    random = np.random.default_rng(1)
+    k = np.geomspace(1e2, 1e4, 21)
+    joined = join_spectra([Spectrum(k, random.exponential(k**-3.6)) for _ in range(64)])
+    assert np.mean(joined.psd / k**-3.6) == pytest.approx(1.0, abs=0.06)
+
+
 def measured(cells=256, periodic=False, seed=1):
     height, _ = road(cells, seed=seed)
     return MeasuredSurface(height, 1e-3, 1e-3, periodic, "m",
