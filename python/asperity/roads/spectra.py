@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import array_of, positive
+from .mode_cells import mean_densities
 from .profile_fit import isotropic_fit
 
 __all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "spectrum_of_map"]
@@ -162,6 +163,10 @@ class Spectrum:
              ) -> FloatArray:
         """Return a periodic map with random phases and the amplitudes of the spectrum.
 
+        The amplitude of a mode follows from the mean density over its cell of the wave-vector
+        plane, so that rms height and slope are those of the spectrum, for a side of one longest
+        wave as for larger ones.
+
         Parameters
         ----------
         nx, ny : int
@@ -178,7 +183,8 @@ class Spectrum:
         """
         kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
         ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
-        amplitude = np.sqrt(self.at(np.hypot(kx, ky[:, None])) * lx * ly)
+        edges = float(self.wavenumber[0]), float(self.wavenumber[-1])
+        amplitude = np.sqrt(mean_densities(self.at, edges, kx, ky) * lx * ly)
         # The phases of white noise are those of a real map; its amplitudes are replaced.
         noise = np.fft.rfft2(np.random.default_rng(seed).standard_normal((ny, nx)))
         size = np.abs(noise)
@@ -286,7 +292,8 @@ def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectr
 
     Where bands overlap, the densities are averaged with weights that fade towards the ends of each
     band, so that no step remains. The mean of the logarithms would be too low, because the density
-    of each scan scatters: by 44 % where each has a single mode. Gaps are bridged by a power law, and noted.
+    of each scan scatters: by 44 % where each has a single mode. Gaps are bridged by a power law,
+    and noted.
 
     Parameters
     ----------
