@@ -770,6 +770,8 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--side", "1e-2", "--short", "1e-4"],
      "short = 0.00025: must be at least two"),
     ([ROAD, ROAD, "--material", "r.nml"], "is given twice"),
+    ([ROAD, "--material", "r.nml", "--slope"],
+     "slope_effect (--slope): needs a coefficient (--coefficient) above 0"),
     ([ROAD, "--material", "r.nml", "--side", "1e-5"], "that are wanted, at most 1e-05 m"),
 ])
 def test_wrong_arguments(tmp_path, monkeypatch, capsys, words, message):

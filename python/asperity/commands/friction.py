@@ -77,7 +77,7 @@ def _add_points(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--coefficient", type=float, default=0.0, metavar="MU",
                         help="Coulomb's coefficient in the interface (default: 0, no friction)")
     parser.add_argument("--slope", action="store_true",
-                        help="let Coulomb's law act on the true slope of the road")
+                        help="let Coulomb's law act on the true slope of the road; needs --coefficient")
     parser.add_argument("--tolerance", type=float, default=1e-5, metavar="E",
                         help="tolerance of the solver (default: 1e-5)")
 

@@ -85,7 +85,7 @@ def friction_curve(
         Coefficient of Coulomb's law in the interface. With 0 the result is the viscous friction
         alone.
     slope_effect : bool
-        Let that law act on the true slope of the road.
+        Let that law act on the true slope of the road. Only with a coefficient above 0.
     cells, patches : int
         Number of cells along a side of a patch, and number of patches.
     side, short : float, optional

@@ -235,7 +235,7 @@ def plan_curve(
     coefficient : float
         Coefficient of Coulomb's law in the interface, 0 to 1000.
     slope_effect : bool
-        Let the law act on the true slope.
+        Let the law act on the true slope. Only with a coefficient above 0.
     angle : float, optional
         Angle between the velocity of the road and x, degrees. The default is 0 on measured maps and
         31.7 on drawn ones. Along an axis the rubber meets its own footprint after a travel of one
@@ -271,6 +271,9 @@ def plan_curve(
         notes.append(f"the maps have room for {counted(road.count, 'patch', 'patches')} without"
                      f" overlap, not for {wanted}")
         wanted = road.count
+    if slope_effect and coefficient == 0.0:
+        raise ValueError("slope_effect (--slope): needs a coefficient (--coefficient) above 0,"
+                         " because it changes Coulomb's law in the interface")
     if angle is None:
         angle = 0.0 if road.is_measured else 31.7
     plan = CurvePlan(road, compound, speed, pressure, temperature, wanted,
