@@ -448,6 +448,20 @@ def test_jobs_in_the_queue_are_not_submitted_again(tmp_path, monkeypatch):
     assert (tmp_path / "calls").read_text() == "x\n"
 
 
+def test_the_plan_has_the_patches_that_an_error_begins_with(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    words = ["friction", ROAD, "--material", "r.nml", "--cells", "32", "--speeds", "1,2", "--plan"]
+    assert main([*words, "--error", "0.1", "--patches", "4"]) == 0
+    printed = capsys.readouterr().out
+    assert ": 8 patches of" in printed and "16 steady states in 8 runs" in printed
+    assert "up to 64 patches, until half of the 95 % interval of the friction is below 0.1" in (
+        printed)
+    assert main([*words, "--patches", "4"]) == 0
+    printed = capsys.readouterr().out
+    assert ": 4 patches of" in printed and "up to 64" not in printed
+
+
 def test_more_patches_until_the_error_is_small(tmp_path):
     plan = small_plan(speeds=[1e-2], patches=2)
     assert len(curve_of(plan, tmp_path, error=1.0).patches) == 8  # fewer may agree by chance
@@ -770,6 +784,10 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--side", "1e-2", "--short", "1e-4"],
      "short = 0.00025: must be at least two"),
     ([ROAD, ROAD, "--material", "r.nml"], "is given twice"),
+    ([ROAD, "--material", "r.nml", "--extend", "1"],
+     "extend = 1: must be shorter than the shortest wave of the spectrum of the road, 0.00025 m"),
+    ([ROAD, "--material", "r.nml", "--extend", "-1"], "extend = -1"),
+    ([ROAD, "--material", "r.nml", "--error", "0", "--plan"], "error = 0"),
     ([ROAD, "--material", "r.nml", "--slope"],
      "slope_effect (--slope): needs a coefficient (--coefficient) above 0"),
     ([ROAD, "--material", "r.nml", "--side", "1e-5"], "that are wanted, at most 1e-05 m"),

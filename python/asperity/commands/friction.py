@@ -77,7 +77,8 @@ def _add_points(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--coefficient", type=float, default=0.0, metavar="MU",
                         help="Coulomb's coefficient in the interface (default: 0, no friction)")
     parser.add_argument("--slope", action="store_true",
-                        help="let Coulomb's law act on the true slope of the road; needs --coefficient")
+                        help="let Coulomb's law act on the true slope of the road; needs"
+                             " --coefficient")
     parser.add_argument("--tolerance", type=float, default=1e-5, metavar="E",
                         help="tolerance of the solver (default: 1e-5)")
 
@@ -158,6 +159,7 @@ def _friction(chosen: argparse.Namespace) -> int:
             raise ValueError(f"--output {output}: must end in {', '.join(_KINDS)}")
         check_folder(output)
     from ..curves import plan_curve, run_curve
+    from ..curves.curve import MOST_PATCHES, first_plan
     from ..curves.outputs import check_outputs, plan_code, write_output
     from ..curves.running import SubmittedError
     from ..curves.sources import compound_of, file_of_road, road_of
@@ -176,8 +178,13 @@ def _friction(chosen: argparse.Namespace) -> int:
                       temperatures=chosen.temperatures, patches=chosen.patches,
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,
                       angle=chosen.angle, tolerance=chosen.tolerance)
+    plan = first_plan(plan, chosen.error, chosen.extend)
     means = Means(*share_of_processors(chosen.jobs, 1), not chosen.no_resume, None, chosen.slurm)
     print(plan.summary(means.side_by_side), flush=True)
+    most = min(MOST_PATCHES, plan.road.count or MOST_PATCHES)
+    if chosen.error is not None and plan.patches < most:
+        print(f"more       up to {most} patches, until half of the 95 % interval of the friction is"
+              f" below {chosen.error:g}", flush=True)
     if chosen.plan:
         return 0
     folder = chosen.folder or outputs[0].with_name(f"{outputs[0].stem}_runs")

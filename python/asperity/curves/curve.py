@@ -21,7 +21,7 @@ from .sources import compound_of, road_of
 if TYPE_CHECKING:
     import xarray
 
-__all__ = ["friction_curve", "run_curve"]
+__all__ = ["first_plan", "friction_curve", "run_curve"]
 
 MOST_PATCHES = 64       # that are taken for the sake of `error`
 # Patches to begin with for the sake of `error`. An interval that is small enough by chance ends the
@@ -102,7 +102,8 @@ def friction_curve(
     draw : bool
         Draw random maps from the combined spectrum of the roads instead of cutting patches.
     extend : float, optional
-        Shortest wavelength (m) to which the spectrum of the road is extrapolated.
+        Shortest wavelength (m) to which the spectrum of the road is extrapolated; shorter than all
+        waves of the spectrum.
         ``friction_left_out`` is the friction that the omitted waves would add.
     wlf, reference, vertical, temperature_tolerance
         Options of the fit of a DMA table, see `asperity.dma.fit_dma`.
@@ -155,6 +156,42 @@ def friction_curve(
     return curve.to_xarray()
 
 
+def first_plan(
+    plan: CurvePlan,
+    error: float | None = None,
+    extend: float | None = None,
+    most_patches: int = MOST_PATCHES,
+) -> CurvePlan:
+    """Return the plan of the runs to begin with: with `error` it has at least 8 patches.
+
+    Parameters
+    ----------
+    plan : CurvePlan
+        See `asperity.curves.plan_curve`.
+    error, extend, most_patches
+        As in `run_curve`. Wrong values raise an error here, before anything runs.
+
+    Returns
+    -------
+    CurvePlan
+
+    Raises
+    ------
+    ValueError
+        If an argument is not allowed.
+    """
+    whole("most_patches", most_patches)
+    shortest = plan.road.whole_spectrum.band[1]
+    if extend is not None and not positive("extend", extend) < shortest:
+        raise ValueError(f"extend = {extend:g}: must be shorter than the shortest wave of the"
+                         f" spectrum of the road, {shortest:.4g} m (extend, --extend)")
+    if error is None:
+        return plan
+    positive("error", error)
+    first = min(FIRST_PATCHES, most_patches, plan.road.count or FIRST_PATCHES)
+    return replace(plan, patches=max(plan.patches, first))
+
+
 def run_curve(
     plan: CurvePlan,
     folder: str | Path,
@@ -196,11 +233,7 @@ def run_curve(
     RuntimeError
         If runs fail, or were submitted to Slurm and are not complete.
     """
-    whole("most_patches", most_patches)
-    if error is not None:
-        positive("error", error)
-        first = min(FIRST_PATCHES, most_patches, plan.road.count or FIRST_PATCHES)
-        plan = replace(plan, patches=max(plan.patches, first))
+    plan = first_plan(plan, error, extend, most_patches)
     if means.slurm is not None and not means.resume:
         raise ValueError("resume = False (--no-resume): not with slurm (--slurm): the same call"
                          " must find the results of the jobs")
