@@ -1093,6 +1093,19 @@ def test_rubbers_that_are_refused(tmp_path, monkeypatch, capsys, material, words
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("roads", "material", "cells", "message"), [
+    ([], RUBBER, 32, "roads: none given: must be at least one"),
+    (ROAD, 3, 32, "material = 3: must be the name of a file, a Prony or a Compound"),
+    (ROAD, None, 32, "material = None: must be the name of a file"),
+    (3, RUBBER, 32, "roads: a int: must be the name of a file"),
+    (ROAD, RUBBER, 1, "cells = 1: must be more than 16 for a side of 0.002 m"),
+    (ROAD, RUBBER, 0, "cells = 0: must be a positive integer")])
+def test_wrong_arguments_in_python(tmp_path, roads, material, cells, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        asperity.friction_curve(roads, material, speeds=[1.0], pressures=[1e5], cells=cells,
+                                folder=tmp_path / "runs")
+
+
 def test_python_gives_a_data_set(tmp_path):
     pytest.importorskip("xarray")
     found = asperity.friction_curve(

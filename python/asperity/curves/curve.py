@@ -75,7 +75,7 @@ def friction_curve(
         Measured maps in any format that `asperity.surface.load` reads; ``"spectrum:FILE"``;
         ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``;
         profiles, which stand for isotropic roads.
-    material : str, Path or Prony
+    material : str, Path, Prony or Compound
         A namelist with ``&material``, a DMA table, or a Prony series.
     speeds, pressures : array_like
         Speeds, m/s, and pressures, Pa.

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.check import positive
+from ..base.check import positive, shown
 from ..base.tables import is_number, text_lines
 from ..roads.measured import MeasuredSurface, load
 from ..roads.patches import DrawnRoad, MeasuredRoad, cleaned
@@ -79,6 +79,8 @@ def road_of(
     OSError, ValueError
         If a file cannot be read, or does not describe a road.
     """
+    if not sources:
+        raise ValueError("roads: none given: must be at least one")
     _check_twice(sources)
     seed = _seed(seed)
     maps: list[MeasuredSurface] = []
@@ -288,6 +290,9 @@ def compound_of(
         constants = wlf_constants(wlf, reference)
         usual = reference if constants is None else constants.t_ref
         return Compound(source, None if usual is None else float(usual), constants)
+    if not isinstance(source, str | Path):
+        raise ValueError(f"material = {shown(source)}: must be the name of a file, a Prony or a"
+                         " Compound")
     path = Path(source)
     lines = text_lines(path)
     words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")

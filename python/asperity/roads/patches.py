@@ -200,6 +200,11 @@ class DrawnRoad:
         Shortest wave, m; eight cells by default.
     seed : int
         Seed of the patches. Roads with different seeds have no patch in common.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not allowed, or the cells are too few for the longest wave.
     """
 
     is_measured = False
@@ -211,7 +216,13 @@ class DrawnRoad:
         self.whole_spectrum = spectrum
         self.cells = whole("cells", cells)
         self.side = 2.0 * spectrum.band[0] if side is None else positive("side", side)
-        least = _CELLS_IN_DRAWN_WAVE * self.side / cells
+        least = _CELLS_IN_DRAWN_WAVE * self.side / self.cells
+        longest = min(self.side, spectrum.band[0])
+        if short is None and not least < longest:
+            raise ValueError(f"cells = {self.cells}: must be more than"
+                             f" {_CELLS_IN_DRAWN_WAVE * self.side / longest:.0f} for a side of"
+                             f" {self.side:.4g} m and waves up to {longest:.4g} m: the shortest"
+                             " wave of a drawn map has eight cells")
         self.short = max(least if short is None else positive("short", short), spectrum.band[1])
         _check_cells(self.short, self.side / cells)
         self.spectrum = spectrum.cut(self.side, self.short)
