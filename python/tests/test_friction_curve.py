@@ -548,6 +548,41 @@ def test_picture(curve, tmp_path):
     assert (tmp_path / "curve.png").stat().st_size > 20000
 
 
+def scattered(curve):
+    """Return a curve in which the patches differ so much that intervals of the area go below 0."""
+    area = curve.values["contact_area"].copy()
+    area[0, 0, :2] *= np.linspace(0.1, 1.9, area.shape[-1])
+    found = replace(curve, values={**curve.values, "contact_area": area})
+    assert (found.mean("contact_area")[1] <= 0.0).sum() == 2
+    return found
+
+
+def test_intervals_below_zero_reach_the_edge_of_a_logarithmic_axis(curve):
+    panel = scattered(curve).plot().axes[-1]
+    bottom = panel.get_ylim()[0]
+    lowest = [one.get_paths()[0].vertices[:, 1].min() for one in panel.collections]
+    assert min(lowest) == bottom > 0.0
+    assert all(low >= bottom for low in lowest)
+    drawn = np.concatenate([line.get_ydata() for line in panel.lines])
+    assert 0.3 * drawn.min() < bottom < drawn.min()
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
+def test_ribbons_on_the_page_continue_below_zero(curve, tmp_path):
+    """On the logarithmic axis of the area the ribbon ended where an interval went below 0."""
+    page = scattered(curve).to_html(tmp_path / "curve.html")
+    with Browser(tmp_path) as browser:
+        browser.open(page)
+        paths = browser.run(
+            "const area = [...document.querySelectorAll('#curves figure')].find((figure) =>"
+            " figure.textContent.includes('Contact area')); return [...area.querySelectorAll("
+            "'.ribbon')].map((path) => path.getAttribute('d'))")
+        assert browser.console() == []
+    axes = curve.pressure.size * curve.temperature.size
+    assert len(paths) == axes and all(path.count("L") == 2 * curve.speed.size - 1
+                                      for path in paths)
+
+
 def test_the_settings_on_the_page_have_units(curve, tmp_path):
     text = curve.to_html(tmp_path / "curve.html").read_text(encoding="utf-8")
     found = dict(re.findall(r"<tr><th>([\w ]+)</th><td>(.*?)</td></tr>", text))

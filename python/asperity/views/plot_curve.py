@@ -51,6 +51,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         figure, places = plt.subplots(1, len(panels), figsize=(DOUBLE_COLUMN, 2.8),
                                       layout="constrained")
         others = [name for name in order if name != along]
+        floor = _floor(curve)
         flagged = [np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True)]
         for number, at in enumerate(np.ndindex(*(axes[name].size for name in others))):
             where = list(at)
@@ -60,6 +61,8 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
             colour = COLOURS[number % len(COLOURS)]
             for panel, (name, theory, _) in zip(places, panels, strict=True):
                 mean, low, high = (part[tuple(where)] for part in curve.mean(name))
+                if panel is places[-1]:
+                    low = np.where(low <= 0.0, floor, low)
                 panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
                 panel.plot(axes[along], mean, "o-", color=colour, label=label or "runs")
                 _mark(panel, axes[along], mean, [one[tuple(where)] for one in flagged], colour)
@@ -76,23 +79,39 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         for panel in places[:-1]:
             panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
         places[-1].set_yscale("log")
+        if (curve.mean("contact_area")[1] <= 0.0).any():
+            places[-1].set_ylim(bottom=floor)
         places[-1].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         places[-1].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         places[-1].yaxis.set_minor_formatter(NullFormatter())
-        if any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in panels):
-            places[0].fill_between([], [], [], color="k", alpha=0.2, linewidth=0,
-                                   label="95 % interval")
-        places[0].plot([], [], "k--", linewidth=0.9, label="Persson's theory")
-        for some, marker, text in zip(flagged, _MARKERS, ("with warnings", "not converged"),
-                                      strict=True):
-            if some.any():
-                places[0].plot([], [], marker, color="k", fillstyle="none", markersize=7,
-                               label=text)
-        # Beside the panels: the intervals may fill them.
-        figure.legend(*places[0].get_legend_handles_labels(), loc="outside lower center",
-                      frameon=False, ncols=4)
+        _legend(figure, places[0], flagged,
+                any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in panels))
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return shown_once(figure)
+
+
+def _legend(figure: Figure, panel: Axes, flagged: list[NDArray[np.bool_]], intervals: bool
+            ) -> None:
+    """Draw the legend beside the panels, because the intervals may fill them."""
+    if intervals:
+        panel.fill_between([], [], [], color="k", alpha=0.2, linewidth=0, label="95 % interval")
+    panel.plot([], [], "k--", linewidth=0.9, label="Persson's theory")
+    for some, marker, text in zip(flagged, _MARKERS, ("with warnings", "not converged"),
+                                  strict=True):
+        if some.any():
+            panel.plot([], [], marker, color="k", fillstyle="none", markersize=7, label=text)
+    figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", frameon=False,
+                  ncols=4)
+
+
+def _floor(curve: FrictionCurve) -> float:
+    """Return the lower edge of the contact area: half of the least value that is drawn.
+
+    The logarithmic axis has no place for intervals that end at 0 or below. They reach this edge.
+    """
+    mean, low, _ = curve.mean("contact_area")
+    drawn = np.concatenate([mean.ravel(), low.ravel(), curve.theory["area_persson"].ravel()])
+    return 0.5 * float(np.min(drawn[drawn > 0.0], initial=1.0))
 
 
 def _mark(panel: Axes, x: NDArray[Any], y: NDArray[Any], flagged: list[NDArray[np.bool_]],

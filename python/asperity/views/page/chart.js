@@ -270,7 +270,7 @@ class Chart {
         const x = this.toX(line.x[i]), y = this.toY(line.y[i]);
         if (x < x0 || x > x1 || !Number.isFinite(y)) continue;
         for (const value of [y, ...this.ribbonAt(line, i)]) {
-          if (value < low) low = value;
+          if (value < low && value > -Infinity) low = value;
           if (value > high) high = value;
         }
       }
@@ -296,7 +296,7 @@ class Chart {
     this.box = box;
     const px = (x) => box.left + (x - x0) / (x1 - x0) * (box.right - box.left);
     const py = (y) => box.bottom - (y - y0) / (y1 - y0) * (box.bottom - box.top);
-    Object.assign(this, {px, py, x0, x1, fx, unitX});
+    Object.assign(this, {px, py, x0, x1, y0, fx, unitX});
 
     const root = this.svg;
     root.setAttribute("width", width);
@@ -354,11 +354,12 @@ class Chart {
     this.drawCursor();
   }
 
-  /** The ends of a line's ribbon at a point. */
+  /** The ends of a line's ribbon at a point. On a logarithmic axis a low end of 0 or less is at minus infinity. */
   ribbonAt(line, i) {
     if (!line.low || line.low[i] === null || line.high[i] === null) return [];
-    const ends = [this.toY(line.low[i]), this.toY(line.high[i])];
-    return ends.every(Number.isFinite) ? ends : [];
+    const low = this.options.log && line.low[i] <= 0 ? -Infinity : this.toY(line.low[i]);
+    const high = this.toY(line.high[i]);
+    return Number.isFinite(high) ? [low, high] : [];
   }
 
   /** The ribbon of a line, piece by piece. */
@@ -375,7 +376,9 @@ class Chart {
     };
     for (let i = 0; i < line.x.length; i++) {
       const ends = line.x[i] === null ? [] : this.ribbonAt(line, i);
-      if (ends.length) piece.push([this.px(this.toX(line.x[i])), ...ends]); else close();
+      // A low end at minus infinity is drawn at the lower edge.
+      if (ends.length) piece.push([this.px(this.toX(line.x[i])), Math.max(ends[0], this.y0), ends[1]]);
+      else close();
     }
     close();
   }
