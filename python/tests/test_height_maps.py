@@ -125,3 +125,12 @@ def test_threads():
     assert asperity.set_threads(1) == 1
     with pytest.raises(ValueError, match="number = -1"):
         asperity.set_threads(-1)
+
+
+def test_curvature_of_a_profile_is_its_second_derivative():
+    """The ridges of a map have half of it as their mean curvature."""
+    wave = np.cos(2 * np.pi * np.arange(64) / 64)[None, :]
+    profile = asperity.surface.statistics(wave, 2 * np.pi)
+    ridges = asperity.surface.statistics(wave * np.ones((64, 1)), 2 * np.pi)
+    assert profile.rms_curvature == pytest.approx(np.sqrt(0.5), rel=1e-12)
+    assert ridges.rms_curvature == pytest.approx(0.5 * np.sqrt(0.5), rel=1e-12)

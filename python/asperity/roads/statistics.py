@@ -50,7 +50,8 @@ class Statistics(NamedTuple):
     rms_slope_differences : float
         The same, computed from differences of neighbouring cells.
     rms_curvature : float
-        Root mean square of the mean curvature, computed in Fourier space, 1/m.
+        Root mean square of the mean curvature (h_xx + h_yy)/2, computed in Fourier space, 1/m. For
+        a profile (ny = 1) it is that of the whole second derivative h_xx, twice its mean curvature.
     nayak : float
         Nayak's parameter m0 m4/m2^2, from the spectral moments of the surface if it is isotropic.
     """
