@@ -272,6 +272,13 @@ def test_a_profile_without_short_waves_has_a_spectrum():
     line = np.cos(2 * np.pi * np.arange(512) / 512 * 9) + np.cos(2 * np.pi * np.arange(512) / 37)
     found = spectrum_of_map(line[None, :], 1.0, 1 / 512)
     assert np.isfinite(found.psd).all() and found.psd[-1] < 1e-6 * found.psd.max()
+    # Between the waves of a periodic profile there is nothing, and the road has no more height.
+    waves = (9, 14, 40)
+    line = sum(np.cos(2 * np.pi * np.arange(512) / 512 * wave) for wave in waves)
+    found = spectrum_of_map(line[None, :], 1.0, 1 / 512, periodic=True)
+    k = np.geomspace(*found.wavenumber[[0, -1]], 2000)
+    variance = np.trapezoid(found.at(k) * k, k) / (2 * np.pi)
+    assert variance == pytest.approx(np.var(line), rel=0.3)
     once = np.cos(2 * np.pi * np.arange(512) / 512 * 9)[None, :]
     with pytest.raises(ValueError, match="roughness of a single wavelength, or of none, between"):
         spectrum_of_map(once, 1.0, 1 / 512, periodic=True)

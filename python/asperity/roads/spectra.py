@@ -235,10 +235,15 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
         low, high = _reliable(density[1:], lx, lx / nx, name)
         slope = density * kx**2
         inside = (kx >= low * (1 - 1e-12)) & (kx <= high * (1 + 1e-12))
-        kept = inside & (slope > _ROUND_OFF * slope.max())
-        if np.count_nonzero(kept) < 2:
+        least = _ROUND_OFF * slope.max()
+        rough = np.flatnonzero(inside & (slope > least))
+        if rough.size < 2:
             raise _too_few(int(np.count_nonzero(inside)), lx, lx / nx, name)
-        return Spectrum(*isotropic_fit(kx[kept], density[kept], not periodic), name)
+        # Smooth modes between rough ones count, too: the road has nothing there.
+        kept = slice(rough[0], rough[-1] + 1)
+        k = kx[kept]
+        return Spectrum(*isotropic_fit(k, np.maximum(density[kept], least / k**2), not periodic),
+                        name)
     ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
     k = np.hypot(kx, ky[:, None]).ravel()[1:]
     k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny), name)
