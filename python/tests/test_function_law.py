@@ -169,6 +169,7 @@ def test_a_case_keeps_the_law(tmp_path):
     (lambda pressure: -pressure, r"is -0\.001 Pa at the pressure 0\.001 Pa: must be finite and 0"),
     (lambda pressure: pressure * np.nan, "is nan Pa at the pressure 0 Pa"),
     (lambda pressure: "rubber", "must return an array of real numbers"),
+    (lambda pressure: pressure * (1 + 0.5j), "real numbers: these are complex"),
     (lambda pressure: 1 + np.sin(pressure), "changes too often"),
 ])
 def test_faults_of_a_function(function, message):

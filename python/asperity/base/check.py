@@ -305,6 +305,8 @@ def stresses_of(
     ValueError: the law is -1 Pa at the pressure 1 Pa: must be finite and 0 or more
     """
     found = function(points.copy())
+    if np.iscomplexobj(found):
+        raise ValueError(f"{name} must return an array of real numbers: these are complex")
     try:
         values = np.array(found, dtype=np.float64)
     except (TypeError, ValueError) as error:
