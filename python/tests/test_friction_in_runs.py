@@ -303,7 +303,10 @@ def test_cells_with_little_pressure_are_solved_too(tmp_path: Path) -> None:
     """The losses of all rows are those of a much finer solve.
 
     A cell that has just come into contact carries so little that means weighted by the pressure do
-    not show whether its pressure is right.
+    not show whether its pressure is right. With such means alone, losses are wrong by 1.5e-3 to
+    1.5e-2 of the largest, at twelve tolerances from 5e-7 to 1.8e-6; with the error of the
+    overlaps, by at most 6e-4. The error does not fall with the loss of a row: the slip of a row at
+    rest is that of the errors of the displacement.
     """
     text = """&grid nx = 16, ny = 16, lx = 0.001, ly = 0.001 /
 &surface shape = 'self_affine', hurst = 0.8, rms_slope = 0.32762288411287727, seed = 158242,
@@ -323,5 +326,4 @@ def test_cells_with_little_pressure_are_solved_too(tmp_path: Path) -> None:
         file = tmp_path / f"light_{tolerance}.h5"
         case.write_text(text.format(tolerance=tolerance, file=file))
         losses.append(np.diff(asperity.run(case, quiet=True).history["dissipated_friction"]))
-    scale = np.maximum(losses[1], 1e-3 * losses[1].max())
-    assert (np.abs(losses[0] - losses[1]) < 0.01 * scale).all()
+    assert np.abs(losses[0] - losses[1]).max() < 1e-3 * losses[1].max()
