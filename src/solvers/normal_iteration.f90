@@ -56,6 +56,9 @@ module normal_iteration
    real(dp), parameter :: sizes(4) = [2e4_dp, 1e5_dp, large, 3e7_dp]
    real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
    integer, parameter :: least_class = 2          !! of oblong cells and line contacts
+   ! Far apart from each other, the patches of a contact need no more steps than on a smaller grid.
+   real(dp), parameter :: sparse = 0.03_dp        !! largest contact fraction of a sparse contact
+   integer, parameter :: largest_class = 2        !! of a sparse contact
    integer, parameter :: steps_before(0:4) = [1, 1, 1, 3, 3]
    integer, parameter :: steps_after(0:4) = [1, 2, 3, 4, 6]
    integer, parameter :: steps_alone(0:4) = [0, 0, 2, 2, 2]   !! if no cells are released
@@ -67,6 +70,7 @@ module normal_iteration
    type :: iteration_type
       integer :: phase = phase_restart
       logical :: releases = .false.         !! the cells with a negative trial pressure are released
+      integer :: class = 0                  !! place in the lists of steps
       real(dp) :: kappa = 1.0_dp            !! by which trials are shorter than the model says
       real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
       real(dp) :: slope = 0.0_dp            !! r.d
@@ -92,12 +96,14 @@ contains
       far_rim_pays = cells >= large
    end function far_rim_pays
 
-   !> The place of a grid in the lists of steps. The stencil fits oblong cells less well, and a line contact has many cells
-   !> along its only direction: they need more steps.
-   pure integer function size_class(grid)
+   !> The place of a contact in the lists of steps. The stencil fits oblong cells less well, and a line contact has many
+   !> cells along its only direction: they need more steps.
+   pure integer function size_class(grid, contact)
       type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: contact                  !! fraction of the cells
 
       size_class = count(grid%cells() >= sizes)
+      if (contact <= sparse) size_class = min(size_class, largest_class)
       if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong .or. min(grid%nx, grid%ny) == 1) &
          size_class = max(size_class, least_class)
    end function size_class
@@ -124,8 +130,8 @@ contains
          pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load
       now%releases = model_fits(work)
-      steps = size_class(work%grid)
-      steps = merge(steps_before(steps), steps_alone(steps), now%releases)
+      now%class = size_class(work%grid, measure%contact)
+      steps = merge(steps_before(now%class), steps_alone(now%class), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, before, rz, now%rz)
@@ -187,7 +193,7 @@ contains
       fixed_load = task%control == control_pressure
       alpha = trial_length(work, task%modulus, now)
       if (is_releasing(now)) call work%preconditioner%release(work%coarse, work%active, &
-         steps_after(size_class(work%grid)), trial_type(alpha, work%offset), pressure, work%direction)
+         steps_after(now%class), trial_type(alpha, work%offset), pressure, work%direction)
       call try_pressure(work, alpha, pressure, step, trial)
       if (trial%cells < 1.0_dp .and. fixed_load) then
          call shorten(now)
