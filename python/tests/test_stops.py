@@ -95,6 +95,20 @@ OVER_THE_EDGE = """
 """
 
 
+def test_a_stop_just_after_a_restart_writes_no_wrong_slip(tmp_path: Path) -> None:
+    """The slip is not part of the checkpoint, so that there is no snapshot before the next row."""
+    case = tmp_path / "parts.nml"
+    case.write_text(SWINGING)
+    go(case, 6)
+    names = snapshots(case)
+    assert names[-1] == "000005"
+    assert np.abs(asperity.open(case.with_suffix(".h5")).snapshots[-1].slip_x).max() > 0
+    go(case, 0, restart=True)
+    assert snapshots(case) == names[:-1]
+    go(case, 1, restart=True)
+    assert snapshots(case) == [*names[:-1], "000006"]
+
+
 @pytest.mark.parametrize("text, word", [(SWINGING, "numerical stick-slip"),
                                         (OVER_THE_EDGE, "edge")])
 def test_warnings_after_stops(tmp_path: Path, text: str, word: str) -> None:

@@ -10,7 +10,7 @@ module asperity_signals
    implicit none
    private
 
-   public :: catch_signals, catch_stops, checkpoint_asked, forget_checkpoint, give_back_stops, &
+   public :: catch_signals, catch_stops, checkpoint_asked, forget_checkpoint, give_back_stops, on_linux, &
       stop_signal, stop_signal_name, stop_was_asked
 
    integer(c_int), parameter :: signal_hang_up = 1        !! SIGHUP
@@ -58,18 +58,21 @@ contains
    !> because nohup relies on it.
    subroutine catch_signals()
       type(c_funptr) :: before, ignore
-      logical :: on_linux
 
       before = c_signal(signal_interrupt, c_funloc(note_stop))
       before = c_signal(signal_terminate, c_funloc(note_stop))
       before = c_signal(signal_time, c_funloc(note_stop))
       before = c_signal(signal_hang_up, c_funloc(note_stop))
       if (transfer(before, 0_c_intptr_t) == ignored) before = c_signal(signal_hang_up, before)
-      inquire (file='/proc/self/status', exist=on_linux)
-      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux), c_funloc(note_checkpoint))
+      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux()), c_funloc(note_checkpoint))
       ignore = transfer(ignored, ignore)
       before = c_signal(signal_file_size, ignore)
    end subroutine catch_signals
+
+   !> Is this Linux? The numbers of some signals depend on the system.
+   logical function on_linux()
+      inquire (file='/proc/self/status', exist=on_linux)
+   end function on_linux
 
    !> Let signals ask for a stop during one call of a host program, such as Python. The host's own
    !> actions for these signals are saved, and `give_back_stops` restores them.

@@ -16,6 +16,7 @@
 module trial_process
    use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
    use asperity_errors, only : error_file, error_type, fail
+   use asperity_signals, only : on_linux
    use text_tools, only : to_text
    implicit none
    private
@@ -28,7 +29,9 @@ module trial_process
    !> SIGILL, SIGABRT, SIGBUS (Linux), SIGFPE, SIGBUS (macOS), SIGSEGV, SIGALRM, SIGTERM, SIGINT.
    integer(c_int), parameter :: signals(9) = [4, 6, 7, 8, 10, 11, 14, 15, 2]
 
-   integer, parameter :: crashes(5) = [4, 5, 6, 8, 11]         !! SIGILL, SIGTRAP, SIGABRT, SIGFPE, SIGSEGV
+   !> Signals of a crash: SIGILL, SIGTRAP, SIGABRT, SIGFPE, SIGSEGV. SIGBUS has another number on each system.
+   integer, parameter :: crashes(5) = [4, 5, 6, 8, 11]
+   integer, parameter :: bus_linux = 7, bus_other = 10         !! SIGBUS of Linux, and of macOS
 
    !> A trial.
    type :: trial_type
@@ -120,18 +123,10 @@ contains
       if (found < 0 .or. number == 0) return
       if (number == alarm_signal) then
          call fail(error, error_file, path//': the file is damaged: reading it does not end')
-      else if (any(number == crashes) .or. number == bus_signal()) then
+      else if (any(number == crashes) .or. number == merge(bus_linux, bus_other, on_linux())) then
          call fail(error, error_file, path//': the file is damaged: HDF5 crashes when it reads it '// &
             '(signal '//to_text(number)//')')
       end if
    end subroutine verdict
-
-   !> The number of SIGBUS.
-   integer function bus_signal()
-      logical :: on_linux
-
-      inquire (file='/proc/self/status', exist=on_linux)
-      bus_signal = merge(7, 10, on_linux)                      ! 10 is SIGUSR1 on Linux
-   end function bus_signal
 
 end module trial_process

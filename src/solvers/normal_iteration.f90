@@ -56,7 +56,7 @@ module normal_iteration
    real(dp), parameter :: sizes(4) = [2e4_dp, 1e5_dp, large, 3e7_dp]
    real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
    integer, parameter :: least_class = 2          !! of oblong cells and line contacts
-   ! Far apart from each other, the patches of a contact need no more steps than on a smaller grid.
+   ! A contact that is a small part of a large grid needs no more steps than one on a smaller grid.
    real(dp), parameter :: sparse = 0.03_dp        !! largest contact fraction of a sparse contact
    integer, parameter :: largest_class = 2        !! of a sparse contact
    integer, parameter :: steps_before(0:4) = [1, 1, 1, 3, 3]
