@@ -551,7 +551,7 @@ contains
       term%wavelength_long = 2.0_dp
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 2, 'two warnings')
-      call check_order(index(warnings(1), 'wavelength_long = 2.000E+00'), '>', 0, &
+      call check_order(index(warnings(1), 'wavelength_long = 2 m'), '>', 0, &
          'waves as long as the side')
       call check_order(index(warnings(2), '6.4 cells'), '>', 0, 'few cells per wave')
       term%wavelength_long = 0.5_dp
@@ -611,7 +611,7 @@ contains
       call find_warnings(grid, [term], warnings)
       call check_that(size(warnings) == 3, 'there are warnings of size, unit and edges')
       call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': according to the file '// &
-         'the map is 2.5000E-01 m by 6.0000E-01 m, but the grid is 5.0000E-01 m by') == 1, 'another length')
+         'the map is 0.25 m by 0.6 m, but the grid is 0.5 m by') == 1, 'another length')
       call check_order(index(warnings(2), 'the unit of the map is um (attribute units'), '>', 0, 'another unit')
       call check_order(index(warnings(3), 'not periodic'), '>', 0, 'edges that do not fit')
       call map_in_another_dataset(grid, term)
@@ -682,7 +682,7 @@ contains
          deallocate (map)
          call find_warnings(grid, [term], warnings)
          call check_that(size(warnings) == 1, 'a steep map causes a warning')
-         call check_order(index(warnings(1), 'the slope of the map is about 5.00E+00, but'), '>', 0, trim(warnings(1)))
+         call check_order(index(warnings(1), 'the slope of the map is about 5, but'), '>', 0, trim(warnings(1)))
          term%scale = -0.59_dp
          call find_warnings(grid, [term], warnings)
          call check_that(size(warnings) == 0, 'a slope of 2.95 after scaling: no warning')
@@ -704,8 +704,8 @@ contains
       call check_that(oblong_warning(grid) == '', 'cells 99 times as long as wide: no warning')
       grid = new_grid(20, 30, 2e-3_dp*150.0_dp, 3e-3_dp, boundary_free)
       text = oblong_warning(grid)
-      call check_that(index(text, 'cells of 1.500E-02 m by 1.000E-04 m') > 0 .and. &
-         index(text, '1.50E+02') > 0, 'cells 150 times as long as wide: '//text)
+      call check_that(index(text, 'cells of 0.015 m by 1e-4 m') > 0 .and. &
+         index(text, 'ratio is 150:') > 0, 'cells 150 times as long as wide: '//text)
       grid = new_grid(20, 1, 2e-3_dp, 1.0_dp, boundary_periodic)
       call check_that(oblong_warning(grid) == '', 'a line has no width')
 
@@ -716,12 +716,12 @@ contains
       call check_that(steepness_warning(term) == '', 'a steep wave, without a warning')
       term%amplitude = -4e-1_dp
       text = steepness_warning(term)
-      call check_that(index(text, '2.51E+03') > 0, 'an amplitude in another unit: '//text)
+      call check_that(index(text, 'about 2510,') > 0, 'an amplitude in another unit: '//text)
       term%shape = 'self_affine'
       term%wavelength_long = 1e-3_dp
       term%rms_height = 1.0_dp
       text = steepness_warning(term)
-      call check_that(index(text, '6.28E+03') > 0, 'an rms height in another unit: '//text)
+      call check_that(index(text, 'about 6280,') > 0, 'an rms height in another unit: '//text)
       term%rms_height = 0.0_dp
       term%rms_slope = 2.9_dp
       call check_that(steepness_warning(term) == '', 'a steep road, without a warning')
@@ -733,7 +733,7 @@ contains
       call check_that(cap_warning(term, grid) == '', 'a sphere of a little more than four cells')
       term%radius = 7.9e-4_dp
       text = cap_warning(term, grid)
-      call check_that(index(text, 'the radius of the ''sphere'', 7.900E-04 m, is less than four cells of 2.000E-04 m') > 0, &
+      call check_that(index(text, 'the radius of the ''sphere'', 7.9e-4 m, is less than four cells of 2e-4 m') > 0, &
          'a sphere of less than four cells: '//text)
       term%shape = 'cylinder'
       call check_that(cap_warning(term, grid) == '', 'a cylinder lies along y')

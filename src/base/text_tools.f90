@@ -4,7 +4,7 @@ module text_tools
    implicit none
    private
 
-   public :: add_line, exact_text, in_one_line, in_quotes, lower, nearest_name, next_line, to_text
+   public :: add_line, exact_text, in_one_line, in_quotes, lower, nearest_name, next_line, rounded_text, to_text
 
    !> Convert a number to a short text.
    interface to_text
@@ -180,7 +180,7 @@ contains
       real(dp), intent(in) :: number
       character(:), allocatable :: text
 
-      text = with_digits(number, 6)
+      text = rounded_text(number, 6)
    end function text_of_real
 
    !> A real number with the fewest digits that give the same number when they are read.
@@ -191,7 +191,7 @@ contains
       real(dp) :: again
 
       do digits = 1, 17
-         text = with_digits(number, digits)
+         text = rounded_text(number, digits)
          read (text, *, iostat=status) again
          if (status /= 0) cycle
          if (abs(again - number) <= 0.0_dp) return
@@ -199,7 +199,7 @@ contains
    end function exact_text
 
    !> A real number rounded to a number of significant digits, without zeros at its end.
-   pure function with_digits(number, digits) result(text)
+   pure function rounded_text(number, digits) result(text)
       real(dp), intent(in) :: number
       integer, intent(in) :: digits             !! 1 to 17
       character(:), allocatable :: text
@@ -234,6 +234,6 @@ contains
          text = text//'e'//text_of_integer(exponent)
       end if
       if (number < 0.0_dp) text = '-'//text
-   end function with_digits
+   end function rounded_text
 
 end module text_tools

@@ -8,7 +8,7 @@ module scale_warnings
    use surface_settings, only : surface_settings_type
    use surface_shapes, only : find_shape, shape_type
    use surface_warnings, only : largest_slope
-   use text_tools, only : to_text
+   use text_tools, only : rounded_text, to_text
    implicit none
    private
 
@@ -24,17 +24,15 @@ contains
    pure function oblong_warning(grid) result(text)
       type(grid_type), intent(in) :: grid
       character(:), allocatable :: text
-      character(300) :: line
       real(dp) :: aspect
 
       text = ''
       if (min(grid%nx, grid%ny) == 1) return
       aspect = max(grid%dx/grid%dy, grid%dy/grid%dx)
       if (aspect <= largest_aspect) return
-      write (line, '(2(a, es9.3), a, es8.2, a)') '&grid: cells of ', grid%dx, ' m by ', grid%dy, &
-         ' m have sides whose ratio is ', aspect, ': above 100 a length is often in another unit; '// &
+      text = '&grid: cells of '//rounded_text(grid%dx, 4)//' m by '//rounded_text(grid%dy, 4)// &
+         ' m have sides whose ratio is '//rounded_text(aspect, 3)//': above 100 a length is often in another unit; '// &
          'check lx and ly, or choose nx and ny so that the cells are nearly square'
-      text = trim(line)
    end function oblong_warning
 
    !> A warning if the slope of a surface is far from small. Empty if all is well. Of a random surface
@@ -42,7 +40,6 @@ contains
    pure function steepness_warning(term) result(text)
       type(surface_settings_type), intent(in) :: term  !! checked
       character(:), allocatable :: text
-      character(300) :: line
       type(shape_type) :: shape
       real(dp) :: slope
 
@@ -57,10 +54,9 @@ contains
          return
       end if
       if (slope <= largest_slope) return
-      write (line, '(a, es8.2, a)') '&surface: the slope of '''//trim(term%shape)//''' is about ', slope, &
+      text = '&surface: the slope of '''//trim(term%shape)//''' is about '//rounded_text(slope, 3)// &
          ', but the solid is linear and its surface flat, which holds for small slopes only: check the '// &
          'units of its heights and wavelengths'
-      text = trim(line)
    end function steepness_warning
 
    !> A warning if a sphere or a cylinder has a radius of few cells, so that the road is hardly more than a spike on a
@@ -69,7 +65,6 @@ contains
       type(surface_settings_type), intent(in) :: term  !! checked
       type(grid_type), intent(in) :: grid
       character(:), allocatable :: text
-      character(300) :: line
       real(dp) :: side
 
       text = ''
@@ -77,10 +72,9 @@ contains
       if (term%shape == 'sphere' .and. grid%ny > 1) side = max(grid%dx, grid%dy)
       if (.not. any(term%shape == ['sphere  ', 'cylinder'])) return
       if (term%radius >= least_radius*side) return
-      write (line, '(a, es9.3, a, es9.3, a)') '&surface: the radius of the '''//trim(term%shape)//''', ', term%radius, &
-         ' m, is less than four cells of ', side, ' m: the road is a spike on a plane; check the units, or use '// &
-         'smaller cells'
-      text = trim(line)
+      text = '&surface: the radius of the '''//trim(term%shape)//''', '//rounded_text(term%radius, 4)// &
+         ' m, is less than four cells of '//rounded_text(side, 4)//' m: the road is a spike on a plane; check the '// &
+         'units, or use smaller cells'
    end function cap_warning
 
    !> A warning if a run has so many rows that the user should know before it starts. Empty if all is well.

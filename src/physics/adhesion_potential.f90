@@ -25,6 +25,7 @@
 module adhesion_potential
    use asperity_errors, only : add_fault, error_input, error_type
    use asperity_precision, only : dp, int64
+   use text_tools, only : to_text
    implicit none
    private
 
@@ -70,7 +71,6 @@ contains
       real(dp), intent(in) :: range            !! z_0, m, > 0; ignored for 'none'
       type(error_type), allocatable, intent(out) :: error
       real(dp), intent(in), optional :: edge   !! of maugis_dugdale, m; 0 if absent; at most the range is used
-      character(120) :: text
 
       select case (name)
       case ('none')
@@ -86,12 +86,10 @@ contains
             "': must be 'none', 'exponential', 'gauss' or 'maugis_dugdale'")
       end select
       if (.not. (energy >= 0.0_dp .and. energy <= huge(1.0_dp))) then
-         write (text, '("adhesion: energy = ", es11.4, ": must be 0 or more (J/m2)")') energy
-         call add_fault(error, error_input, trim(text))
+         call add_fault(error, error_input, 'adhesion: energy = '//to_text(energy)//': must be 0 or more (J/m2)')
       end if
       if (.not. (range > 0.0_dp .and. range <= huge(1.0_dp))) then
-         write (text, '("adhesion: range = ", es11.4, ": must be positive (m)")') range
-         call add_fault(error, error_input, trim(text))
+         call add_fault(error, error_input, 'adhesion: range = '//to_text(range)//': must be positive (m)')
       end if
       self%energy = energy
       self%range = range

@@ -15,6 +15,7 @@ module asperity_surface
    use surface_self_affine, only : add_self_affine
    use surface_settings, only : real_variable, surface_settings_type
    use surface_shapes, only : find_shape, height_formula, place_at, shape_type, shape_words
+   use text_tools, only : to_text
    implicit none
    private
 
@@ -103,18 +104,18 @@ contains
 
       call must_be_positive('wavelength_short', term%wavelength_short, error)
       if (.not. (term%wavelength_rolloff >= term%wavelength_short)) call add_fault(error, &
-         error_input, '&surface: wavelength_rolloff = '//number(term%wavelength_rolloff) &
-         //': must be at least wavelength_short = '//number(term%wavelength_short))
+         error_input, '&surface: wavelength_rolloff = '//to_text(term%wavelength_rolloff) &
+         //': must be at least wavelength_short = '//to_text(term%wavelength_short))
       if (.not. (term%wavelength_long >= term%wavelength_rolloff)) call add_fault(error, &
-         error_input, '&surface: wavelength_long = '//number(term%wavelength_long) &
-         //': must be at least wavelength_rolloff = '//number(term%wavelength_rolloff))
+         error_input, '&surface: wavelength_long = '//to_text(term%wavelength_long) &
+         //': must be at least wavelength_rolloff = '//to_text(term%wavelength_rolloff))
       if (.not. ieee_is_finite(term%wavelength_long)) call add_fault(error, error_input, &
          '&surface: wavelength_long must be finite')
       if (.not. (term%hurst > 0.0_dp .and. term%hurst <= 1.0_dp)) call add_fault(error, &
-         error_input, '&surface: hurst = '//number(term%hurst)//': must be above 0, at most 1')
+         error_input, '&surface: hurst = '//to_text(term%hurst)//': must be above 0, at most 1')
       if (abs(term%rms_slope) > 0.0_dp .and. abs(term%rms_height) > 0.0_dp) then
-         call add_fault(error, error_input, '&surface: rms_height = '//number(term%rms_height) &
-            //' and rms_slope = '//number(term%rms_slope)//': give one of them')
+         call add_fault(error, error_input, '&surface: rms_height = '//to_text(term%rms_height) &
+            //' and rms_slope = '//to_text(term%rms_slope)//': give one of them')
       else if (abs(term%rms_slope) > 0.0_dp) then
          call must_be_positive('rms_slope', term%rms_slope, error)
       else
@@ -132,7 +133,7 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       if (value > 0.0_dp .and. ieee_is_finite(value)) return
-      call add_fault(error, error_input, '&surface: '//name//' = '//number(value) &
+      call add_fault(error, error_input, '&surface: '//name//' = '//to_text(value) &
          //': must be a positive number')
    end subroutine must_be_positive
 
@@ -143,19 +144,9 @@ contains
       type(error_type), allocatable, intent(inout) :: error
 
       if (ieee_is_finite(value)) return
-      call add_fault(error, error_input, '&surface: '//name//' = '//number(value) &
+      call add_fault(error, error_input, '&surface: '//name//' = '//to_text(value) &
          //': must be finite')
    end subroutine must_be_finite
-
-   !> Convert a number to a short text.
-   pure function number(value) result(word)
-      real(dp), intent(in) :: value
-      character(:), allocatable :: word
-      character(16) :: text
-
-      write (text, '(es12.5)') value
-      word = trim(adjustl(text))
-   end function number
 
    !> Check that the maps of all terms that are files can be used, by reading them; all faults are
    !> reported at once.

@@ -12,7 +12,7 @@ module surface_warnings
    use regular_grid, only : boundary_periodic, grid_type
    use surface_settings, only : surface_settings_type
    use surface_shapes, only : find_shape, shape_type
-   use text_tools, only : in_one_line
+   use text_tools, only : in_one_line, rounded_text
    use trial_process, only : trial_type
    implicit none
    private
@@ -89,9 +89,9 @@ contains
       ly = length_of(file, map, 'ly')
       if (grid%ny == 1) ly = 0.0_dp
       if (differs(lx, grid%lx) .or. differs(ly, grid%ly)) then
-         write (text, '(4(a, es10.4), a)') start//'according to the file the map is ', lx, &
-            ' m by ', merge(ly, grid%ly, ly > 0.0_dp), ' m, but the grid is ', grid%lx, &
-            ' m by ', grid%ly, ' m: this changes its slopes'
+         text = start//'according to the file the map is '//rounded_text(lx, 5)//' m by '// &
+            rounded_text(merge(ly, grid%ly, ly > 0.0_dp), 5)//' m, but the grid is '//rounded_text(grid%lx, 5)// &
+            ' m by '//rounded_text(grid%ly, 5)//' m: this changes its slopes'
          call append(warnings, text)
       end if
       call check_unit(file, map, start, term%scale, warnings)
@@ -164,7 +164,7 @@ contains
       if (allocated(error)) return
       call estimate_slope(grid, term, map, slope)
       if (.not. slope > largest_slope) return
-      write (text, '(a, es8.2, a)') start//'the slope of the map is about ', slope, &
+      text = start//'the slope of the map is about '//rounded_text(slope, 3)// &
          ', but the solid is linear and its surface flat, which holds for small slopes only: check the unit of the '// &
          'heights, which are read as metres times scale, and lx and ly'
       call append(warnings, text)
@@ -276,8 +276,8 @@ contains
       side = grid%lx
       if (grid%ny > 1) side = min(grid%lx, grid%ly)
       if (term%wavelength_long < side*(1.0_dp - round_off)) return
-      write (text, '(2(a, es9.3), a)') '&surface: wavelength_long = ', term%wavelength_long, &
-         ' m is not below the side of ', side, &
+      text = '&surface: wavelength_long = '//rounded_text(term%wavelength_long, 4)// &
+         ' m is not below the side of '//rounded_text(side, 4)// &
          ' m: the surface may be neither Gaussian nor isotropic; a quarter of the side is good'
       call append(warnings, text)
    end subroutine check_long_waves
@@ -298,11 +298,11 @@ contains
       cells = shortest*wavelength/cell
       if (cells >= cells_per_wave*(1.0_dp - round_off)) return
       if (cells > 2.0_dp) then
-         write (text, '(a, es9.3, a, f0.1, a)') '&surface: '//name//' = ', wavelength, &
-            ' m: the shortest wave has ', cells, ' cells; 8 or more are good'
+         text = '&surface: '//name//' = '//rounded_text(wavelength, 4)//' m: the shortest wave has '// &
+            rounded_text(cells, 2)//' cells; 8 or more are good'
       else
-         write (text, '(2(a, es9.3), a)') '&surface: '//name//' = ', wavelength, &
-            ' m: the shortest wave is not above the Nyquist wavelength of ', 2.0_dp*cell, &
+         text = '&surface: '//name//' = '//rounded_text(wavelength, 4)// &
+            ' m: the shortest wave is not above the Nyquist wavelength of '//rounded_text(2.0_dp*cell, 4)// &
             ' m: the grid cannot represent it'
       end if
       call append(warnings, text)
@@ -321,8 +321,8 @@ contains
       if (grid%boundary /= boundary_periodic .or. .not. period > 0.0_dp) return
       waves = side/period
       if (abs(waves - anint(waves)) <= 1.0e-6_dp*max(1.0_dp, waves)) return
-      write (text, '(2(a, es11.5), a, f0.4, a)') '&surface: '//side_name//' = ', side, &
-         ' m and the period of the wave along it, ', period, ' m, make ', waves, &
+      text = '&surface: '//side_name//' = '//rounded_text(side, 6)// &
+         ' m and the period of the wave along it, '//rounded_text(period, 6)//' m, make '//rounded_text(waves, 6)// &
          ' waves: the periodic surface has a step at its edge'
       call append(warnings, text)
    end subroutine check_period
