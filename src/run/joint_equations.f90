@@ -97,7 +97,7 @@ contains
          rules%soft = self%compliance/contact%material%q
          rules%soft_along = contact%tangential%cell_compliance()
          call self%begin(state%tangential%contact /= contact_open, state%pressure, state%gap, &
-            state%tangential%traction, contact%slope_x, contact%slope_y, contact%rms_slope, begun)
+            state%tangential%traction, rules%has_jump(contact%slope_x, contact%slope_y), contact%rms_slope, begun)
          begun%level = state%level
       end associate
    end subroutine start

@@ -159,7 +159,7 @@ contains
             row%sliding_speed = dot_product(slip, contact%state%direction)/plan%dt
          else if (t%block%mass > 0.0_dp) then
             ! The mass keeps its speed in a jump of the load.
-            row%sliding_speed = -dot_product(t%block%speed, contact%state%direction)
+            row%sliding_speed = 0.0_dp - dot_product(t%block%speed, contact%state%direction)   ! not -0
          end if
          row%work_tangential = t%books%work + t%block%work + t%lost_friction
          row%energy_elastic = row%energy_elastic + t%books%stored

@@ -246,19 +246,19 @@ contains
 
    !> Begin with a contact: choose the units and the width of the second range, and make the first state. The caller has
    !> set the grid and the rules, and sets the level of the state.
-   subroutine begin(self, touching, pressure, gap, traction, slope_x, slope_y, rms_slope, state)
+   subroutine begin(self, touching, pressure, gap, traction, jumps, rms_slope, state)
       class(joint_system_type), intent(inout) :: self
       logical, intent(in) :: touching(:, :)
       real(dp), intent(in) :: pressure(:, :), gap(:, :)       !! Pa, m
       real(dp), intent(in) :: traction(:, :, :)               !! Pa
-      real(dp), intent(in) :: slope_x(:, :), slope_y(:, :)    !! of the road under the contact
+      logical, intent(in) :: jumps(:, :)                      !! the traction jumps where the contact ends
       real(dp), intent(in) :: rms_slope                       !! of the road
       type(joint_state_type), intent(inout) :: state
       integer :: c
 
       call self%tiles%forget()
       call choose_units(self, touching, pressure, rms_slope)
-      self%width(:, :) = merge(self%rules%width, 0.0_dp, self%rules%has_jump(slope_x, slope_y))
+      self%width(:, :) = merge(self%rules%width, 0.0_dp, jumps)
       state%s(:, :) = self%rules%number_of(self%width, touching, pressure, gap)
       do c = 1, 2
          state%t(:, c, :) = merge(traction(:, c, :), 0.0_dp, touching)

@@ -169,7 +169,8 @@ contains
       associate (contact => system%contact, rules => system%rules)
          call find_responses(system)
          call system%begin(contact%pressure > 0.0_dp, contact%pressure, contact%gap, contact%traction, &
-            contact%slope_x, contact%slope_y, sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2)), begun)
+            rules%has_jump(contact%slope_x, contact%slope_y), &
+            sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2)), begun)
          begun%level = contact%level
       end associate
    end subroutine start
