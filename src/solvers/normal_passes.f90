@@ -86,9 +86,7 @@ contains
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          correction(:) = self%preconditioner%correction(self%coarse, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            ! The response is not set where the length is 0.
-            response => self%preconditioner%image(:, j)
-            if (self%preconditioner%length > 0.0_sp) response => self%preconditioner%response(:, j)
+            response => self%preconditioner%response_row(j)
             do k = 1, self%active%runs(j)
                associate (a => self%active%first(k, j), b => self%active%last(k, j))
                   rows(j) = rows(j) + overlap_cells(b - a + 1, self%preconditioner%length, &
@@ -178,12 +176,12 @@ contains
       real(sp) :: length
       integer :: k
 
-      ! z = image + length response + correction. The response is not set where the length is 0.
+      ! z = image + length response + correction.
       image => self%preconditioner%image(:, j)
       if (.not. preconditioned) image => self%preconditioner%residual(1:self%grid%nx, j)
       length = merge(self%preconditioner%length, 0.0_sp, preconditioned)
       response => image
-      if (length > 0.0_sp) response => self%preconditioner%response(:, j)
+      if (preconditioned) response => self%preconditioner%response_row(j)
       do k = 1, self%active%runs(j)
          associate (a => self%active%first(k, j), b => self%active%last(k, j))
             call direction_cells(b - a + 1, length, image(a:b), response(a:b), correction(a:b), &

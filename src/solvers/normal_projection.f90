@@ -58,7 +58,7 @@ contains
       sums = total(rows)
    end subroutine try_pressure
 
-   !> Do the same after a release of cells.
+   !> Compute step = trial pressure and its sums in each row after a release of cells, for `try_pressure`.
    subroutine try_changed_pressure(self, alpha, pressure, step, rows)
       type(normal_work_type), intent(inout), target :: self
       real(dp), intent(in) :: alpha
@@ -76,9 +76,7 @@ contains
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          correction(:) = self%preconditioner%correction(self%coarse, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            ! The response is not set where the length is 0.
-            response => self%preconditioner%image(:, j)
-            if (self%preconditioner%length > 0.0_sp) response => self%preconditioner%response(:, j)
+            response => self%preconditioner%response_row(j)
             rows(j) = trial_sums_type()
             do k = 1, self%active%runs(j)
                associate (a => self%active%first(k, j), b => self%active%last(k, j))
@@ -110,7 +108,8 @@ contains
       sums = total(rows)
    end subroutine keep_block_sums
 
-   !> Do the same for a row of blocks. The numbers are found by Newton's method from below, as in `find_clip`.
+   !> Subtract a number per block from the trial pressure in a row of blocks, for `keep_block_sums`. The numbers are found
+   !> by Newton's method from below, as in `find_clip`.
    subroutine keep_strip_sums(self, jb, step, rows)
       type(normal_work_type), intent(in) :: self
       integer, intent(in) :: jb                      !! row of blocks

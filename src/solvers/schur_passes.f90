@@ -37,6 +37,8 @@ module schur_passes
       real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
       real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
       real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
+   contains
+      procedure :: response_row
    end type schur_fields_type
 
    !> The numbers of a step that a pass needs.
@@ -234,6 +236,17 @@ contains
       call coarse%sum_blocks(column, more)
       blocks = blocks + more
    end subroutine add_blocks
+
+   !> The row j of e, of which b lacks the multiple `length`. Where the length is 0, e is not set and may hold any
+   !> numbers; its factor 0 then meets the row of b instead.
+   function response_row(self, j) result(row)
+      class(schur_fields_type), intent(in) :: self
+      integer, intent(in) :: j
+      real(sp), pointer, contiguous :: row(:)
+
+      row => self%image(:, j)
+      if (self%length > 0.0_sp) row => self%response(:, j)
+   end function response_row
 
    !> Repeat the ends of a row of a periodic field in its rim.
    pure subroutine close_row(self, row)

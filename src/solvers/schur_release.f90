@@ -52,9 +52,7 @@ contains
          column(:) = 0.0_sp
          count(:) = 0.0_sp
          do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
-            ! The response is not set where the length is 0.
-            response => self%image(:, j)
-            if (self%length > 0.0_sp) response => self%response(:, j)
+            response => self%response_row(j)
             do k = 1, active%wide_runs(jb)
                associate (a => active%wide_first(k, jb), b => active%wide_last(k, jb))
                   call release_cells(b - a + 1, trial, self%length, response(a:b), correction(a:b), pressure(a:b, j), &
