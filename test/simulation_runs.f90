@@ -13,7 +13,7 @@ module simulation_runs
    implicit none
    private
 
-   public :: check_books, check_same_rows, creep_compliance, last, record_type, run_case, &
+   public :: check_books, check_same_rows, last, record_type, reference_compliance, run_case, &
       start_case, write_map
 
    character, parameter, public :: nl = new_line('a')
@@ -157,7 +157,8 @@ contains
 
    !> Return the creep compliance J(t) of a Prony series, from the zeros and residues of its transform: s G(s) = G_e +
    !> sum g s/(s + 1/tau) has one zero between any two neighbouring relaxation rates, and one below the lowest rate.
-   pure function creep_compliance(g_e, g, tau, t) result(compliance)
+   !> This function is written independently of module `prony`, so that tests can use it as a reference.
+   pure function reference_compliance(g_e, g, tau, t) result(compliance)
       real(dp), intent(in) :: g_e            !! > 0, Pa
       real(dp), intent(in) :: g(:), tau(:)   !! Pa and s; tau ascending
       real(dp), intent(in) :: t              !! s
@@ -182,7 +183,7 @@ contains
          compliance = compliance - exp(-middle*t) &
             /(middle*sum(g/tau/(1.0_dp/tau - middle)**2))
       end do
-   end function creep_compliance
+   end function reference_compliance
 
    !> Write a height map to a file that `&surface shape = 'file'` reads.
    subroutine write_map(path, map)

@@ -2,7 +2,7 @@
 module test_simulation
    use check, only : begin_suite, check_close, check_order, check_that, selected
    use asperity_precision, only : dp, pi
-   use simulation_runs, only : check_books, check_same_rows, creep_compliance, last, nl, record_type, &
+   use simulation_runs, only : check_books, check_same_rows, last, nl, record_type, reference_compliance, &
       run_case
    use text_tools, only : to_text
    implicit none
@@ -54,7 +54,7 @@ contains
          thesis_sphere//thesis_rubber//'&phase force = 0.02e-3, duration = 1, steps = 24 /'//nl// &
          '&phase duration = 19, steps = 20 /'//nl//'&solver tolerance = 1e-8 /', 'Lee-Radok', record)
       do k = 0, last(record)
-         a = (3.0_dp/16.0_dp*radius*force*creep_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], &
+         a = (3.0_dp/16.0_dp*radius*force*reference_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], &
             [1.0_dp/11.0_dp], record%rows(k)%time))**(1.0_dp/3.0_dp)
          ! The area is a count of cells, with an error of half a cell along the edge of the contact.
          if (k <= 24) then
@@ -80,7 +80,7 @@ contains
       real(dp) :: reference, worst
       integer :: k
 
-      call check_close(creep_compliance(g_e, g, tau, 0.0_dp)*(g_e + sum(g)), 1.0_dp, 1e-12_dp, 'J(0)')
+      call check_close(reference_compliance(g_e, g, tau, 0.0_dp)*(g_e + sum(g)), 1.0_dp, 1e-12_dp, 'J(0)')
       call run_case(small_map//thesis_sphere// &
          '&material shear_modulus = 0.1e6, prony_g = 0.4e6, 0.3e6, 0.2e6, 0.1e6, '// &
          'prony_tau = 1e-3, 1e-2, 1e-1, 1 /'//nl// &
@@ -89,7 +89,7 @@ contains
          '&phase duration = 3.6, steps = 16 /'//nl//'&solver tolerance = 1e-8 /', 'four arms', record)
       worst = 0.0_dp
       do k = 0, last(record)
-         reference = (3.0_dp/16.0_dp*radius*force*creep_compliance(g_e, g, tau, &
+         reference = (3.0_dp/16.0_dp*radius*force*reference_compliance(g_e, g, tau, &
             record%rows(k)%time))**(2.0_dp/3.0_dp)/radius
          worst = max(worst, abs(record%rows(k)%displacement/reference - 1.0_dp))
       end do
@@ -111,7 +111,7 @@ contains
             '&phase force = 0.02e-3, duration = 0.2, steps = 16 /'//nl//'&solver tolerance = 1e-8 /', &
             'mesh', record)
          errors(k) = abs(record%rows(last(record))%displacement*radius/(3.0_dp/16.0_dp*radius*force &
-            *creep_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], [1.0_dp/11.0_dp], 0.2_dp)) &
+            *reference_compliance(1.0e6_dp/11.0_dp, [1.0e6_dp/1.1_dp], [1.0_dp/11.0_dp], 0.2_dp)) &
             **(2.0_dp/3.0_dp) - 1.0_dp)
       end do
       call check_that(errors(2) < errors(1)/1.8_dp .and. errors(3) < errors(2)/1.8_dp &
@@ -207,7 +207,7 @@ contains
             growth = record%rows(k)%displacement - record%rows(k - 1)%displacement
             steady = steady .and. growth > 0.0_dp .and. growth < before
             before = growth
-            reference = (3.0_dp/16.0_dp*radius*force*creep_compliance(0.2e6_dp, g, tau, &
+            reference = (3.0_dp/16.0_dp*radius*force*reference_compliance(0.2e6_dp, g, tau, &
                record%rows(k)%time))**(2.0_dp/3.0_dp)/radius
             ! The first steps contain most of the spectrum.
             if (k == 1) call check_close(record%rows(k)%displacement/reference, 1.0_dp, 0.08_dp, &

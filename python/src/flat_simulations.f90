@@ -18,7 +18,7 @@ module flat_simulations
    use run_handles, only : driven_of, driven_type, find_driven, free_handle, new_driven
    use simulation_state, only : load_state, save_state
    use steering, only : steer_load, steer_temperature, steer_velocity
-   use text_tools, only : next_line, to_text
+   use text_tools, only : next_line
    implicit none
    private
 

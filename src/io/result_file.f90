@@ -8,7 +8,7 @@
 !> fault and later calls do nothing. `report`, `end_snapshot`, `append_row`, `finish` and `close`
 !> return that fault (see `hdf5_handle`).
 module result_file
-   use asperity_errors, only : error_file, error_input, error_type, fail
+   use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp, int8
    use checkpoint_link, only : add_link, remove_link
    use file_system, only : remove_file, rename_file

@@ -21,7 +21,7 @@ module joint_equations
    use friction_law, only : contact_open, contact_slip, contact_stick
    use joint_system, only : joint_state_type, joint_system_type
    use joint_tiles, only : even, near_values, odd
-   use regular_grid, only : boundary_periodic, grid_type
+   use regular_grid, only : boundary_periodic
    use rubber_kernels, only : normal_kernel
    implicit none
    private

@@ -19,7 +19,7 @@ module tangential_step
    use field_sums, only : field_count, vector_sum
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
-   use friction_law, only : contact_slip, contact_stick, friction_law_type, new_friction_law
+   use friction_law, only : contact_stick, friction_law_type, new_friction_law
    use asperity_precision, only : dp
    use regular_grid, only : boundary_periodic, grid_type
    use road_pull, only : road_pull_type

@@ -13,7 +13,7 @@ module steady_joint
    use asperity_interpolation, only : displaced, interpolation_type
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp
-   use field_sums, only : field_count, field_mean, field_sum, ratio_of_lengths
+   use field_sums, only : field_count, field_mean, ratio_of_lengths
    use friction_law, only : friction_law_type
    use joint_newton, only : joint_newton_type
    use joint_path, only : follow_path
