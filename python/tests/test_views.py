@@ -132,7 +132,7 @@ def test_progress_in_a_notebook_is_a_bar(monkeypatch, capsys):
     # Only what does not fit into a bar is printed.
     assert capsys.readouterr().err.splitlines() == [
         "sweep: 1 of 4 results are there already",
-        "sweep: 3 of 4 done, 1 failed, about 0.0 s left: case1: FAILED: no contact"]
+        "sweep: 3 of 4 done, 1 failed, about 0 s left: case1: FAILED: no contact"]
 
 
 @pytest.mark.parametrize("wrong", [

@@ -17,7 +17,8 @@ from conftest import PATIENCE, frictional_result, write_result
 
 import asperity
 from asperity.__main__ import main
-from asperity.watch import Pace, duration, picture, sparkline, watch
+from asperity.base.durations import duration
+from asperity.watch import Pace, picture, sparkline, watch
 
 
 def test_sparklines():

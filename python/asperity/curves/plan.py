@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import array_of, number, positive, whole
+from ..base.durations import duration
 from ..base.names import counted
 from ..roads.patches import DrawnRoad, MeasuredRoad, Patch
 from ..rubber.compound import Compound
@@ -198,7 +199,7 @@ class CurvePlan:
             f" {counted(self.temperature.size, 'temperature')}",
             f"solves     {counted(self.solves, 'steady state')} in"
             f" {counted(self.solves // self.speed.size, 'run')}, {side_by_side} at a time",
-            f"time       about {_duration(_COMMAND + self.seconds() / side_by_side)}, if the"
+            f"time       about {duration(_COMMAND + self.seconds() / side_by_side)}, if the"
             " processors have nothing else to do",
             f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
         ]
@@ -322,17 +323,3 @@ def _band_note(plan: CurvePlan, celsius: float) -> list[str]:
                          f" measured frequencies: the limit is {end:.3g} m/s, beyond it the series"
                          " is a guess")
     return notes
-
-
-def _duration(seconds: float) -> str:
-    """Return a duration as text.
-
-    Examples
-    --------
-    >>> _duration(30.0), _duration(4000.0)
-    ('30 s', '1 h 7 min')
-    """
-    if seconds < 90.0:
-        return f"{max(seconds, 1.0):.0f} s"
-    minutes = round(seconds / 60.0)
-    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

@@ -16,46 +16,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.durations import short_time
 from ..base.names import counted
 
 if TYPE_CHECKING:
     from .result_file import ResultFile
 
-__all__ = ["duration", "held", "note_of", "rows_of", "seems_dead", "short_time", "silence",
-           "standing", "time_of_row", "way_on"]
+__all__ = ["held", "note_of", "rows_of", "seems_dead", "silence", "standing", "time_of_row",
+           "way_on"]
 
 LAST = 20  # number of last rows from which the time of the next one is estimated
 PATIENCE = 20.0  # factor on the longest of them before a run counts as killed
 LEAST = 15.0  # shortest waiting time, s, because writing a large snapshot may take as long
-
-
-def duration(seconds: float) -> str:
-    """Return a time in words.
-
-    Examples
-    --------
-    >>> duration(8), duration(75), duration(7300), duration(200000), duration(float("nan"))
-    ('8 s', '1 min 15 s', '2 h 1 min', '2 d 7 h', 'unknown')
-    """
-    if not np.isfinite(seconds):
-        return "unknown"
-    whole = round(seconds)
-    for size, unit, part, name in ((86400, "d", 3600, "h"), (3600, "h", 60, "min"),
-                                   (60, "min", 1, "s")):
-        if whole >= size:
-            return f"{whole // size} {unit} {whole % size // part} {name}"
-    return f"{whole} s"
-
-
-def short_time(seconds: float) -> str:
-    """Return a time in words, with two digits if it is short.
-
-    Examples
-    --------
-    >>> short_time(0.0213), short_time(75)
-    ('0.021 s', '1 min 15 s')
-    """
-    return f"{seconds:.2g} s" if seconds < 10.0 else duration(seconds)
 
 
 def rows_of(run: ResultFile) -> str:

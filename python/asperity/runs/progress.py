@@ -6,6 +6,7 @@ import sys
 import time
 from typing import TextIO
 
+from ..base.durations import duration, short_time
 from .notebook_bar import notebook_bar
 
 __all__ = ["Progress"]
@@ -61,7 +62,7 @@ class Progress:
         if not self._done or not left:
             return ""
         seconds = (time.monotonic() - self._start) / self._done * left
-        return f", about {_duration(seconds)} left"
+        return f", about {duration(seconds)} left"
 
     def done(self, name: str, fault: str | None, seconds: float, running: int) -> None:
         """Count a case; `fault` is None unless it failed."""
@@ -73,7 +74,7 @@ class Progress:
             self._bar.show(self._kept + self._done, self._total,
                            f"{self._what}: {self._state()}{self._left()}")
         if fault is not None or not (self._terminal or self._bar):
-            how = f"done in {_duration(seconds)}" if fault is None else f"FAILED: {fault}"
+            how = f"done in {short_time(seconds)}" if fault is None else f"FAILED: {fault}"
             self._line(f"{self._what}: {self._state()}{self._left()}: {name}: {how}")
         self.show(running)
 
@@ -83,19 +84,3 @@ class Progress:
             self._stream.write("\n")
             self._stream.flush()
             self._width = 0
-
-
-def _duration(seconds: float) -> str:
-    """Return a time in words.
-
-    Examples
-    --------
-    >>> _duration(3.21), _duration(75), _duration(7320)
-    ('3.2 s', '1 min 15 s', '2 h 02 min')
-    """
-    if seconds < 60:
-        return f"{seconds:.1f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {rest:02d} s"
-    return f"{minutes // 60} h {minutes % 60:02d} min"

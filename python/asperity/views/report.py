@@ -1,6 +1,6 @@
 """The HTML page about a run: one file for any browser, which loads nothing else.
 
-``python -m asperity report`` and `Run.report` call `write_report`.
+``asperity report`` and `Run.report` call `write_report`.
 """
 
 from __future__ import annotations
@@ -12,19 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.durations import short_time
 from ..base.files import write_text
 from ..base.library import version
 from ..base.names import counted
 from ..results.settings import has_friction, solver_setting
-from ..results.standing import (
-    held,
-    rows_of,
-    seems_dead,
-    short_time,
-    silence,
-    time_of_row,
-    way_on,
-)
+from ..results.standing import held, rows_of, seems_dead, silence, time_of_row, way_on
 from ..results.steady import steady_mean, steady_rows
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_data import faulty, now, page_data

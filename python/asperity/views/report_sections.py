@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.durations import duration
 from ..results.derived import closure, energy_terms, missing_work
 from ..results.settings import parse_settings, phase_names, solver_setting
-from ..results.standing import duration
 from .style import si_scale, typeset
 
 if TYPE_CHECKING:

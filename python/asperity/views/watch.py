@@ -15,17 +15,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
+from ..base.durations import duration, short_time
 from ..results import Run
-from ..results.standing import (
-    duration,
-    held,
-    rows_of,
-    seems_dead,
-    short_time,
-    silence,
-    time_of_row,
-    way_on,
-)
+from ..results.standing import held, rows_of, seems_dead, silence, time_of_row, way_on
 from ..results.steady import steady_rows
 from .style import si_scale
 
