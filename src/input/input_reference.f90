@@ -186,7 +186,8 @@ contains
       rows = [ &
          row('adhesion', 'potential', kind_word, '''none''', '', &
             '''none'' | ''exponential'' | ''gauss'' | ''maugis_dugdale''', &
-            'Energy as a function of the gap g: -w exp(-g/r), -w exp(-g^2/r^2), or -w (1 - g/r) up to g = r.'), &
+            'Energy as a function of the gap g: -w exp(-g/r), -w exp(-g^2/r^2), or -w (1 - g/r) up to g = r '// &
+            '(its end is rounded over the width of a cell).'), &
          row('adhesion', 'energy', kind_real, '(required)', 'J/m2', 'not negative', &
          'Work of adhesion w per area.'), &
          row('adhesion', 'range', kind_real, '(required)', 'm', 'positive', 'Range r of the attraction.'), &

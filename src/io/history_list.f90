@@ -45,7 +45,7 @@ contains
       call table%add(prefix//'traction_y', row%traction_y, 'Pa', &
          'mean tangential traction on the rubber along y')
       call table%add(prefix//'stick_area', row%stick_area, '1', &
-         'fraction of the grid that sticks: its slip cannot be told from none')
+         'fraction of the grid that sticks: its slip is zero to the tolerance')
       call table%add(prefix//'sliding_speed', row%sliding_speed, 'm/s', &
          'mean speed of the road over the rubber''s surface along the road''s velocity')
       call table%add(prefix//'friction_viscous', row%friction_viscous, '1', &

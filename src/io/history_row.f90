@@ -30,7 +30,7 @@ module history_row
       real(dp) :: road_y = 0.0_dp               !! [m] displacement of the road along y
       real(dp) :: traction_x = 0.0_dp           !! [Pa] mean tangential traction on the rubber along x
       real(dp) :: traction_y = 0.0_dp           !! [Pa] mean tangential traction on the rubber along y
-      real(dp) :: stick_area = 0.0_dp           !! [1] fraction of the grid that sticks: its slip cannot be told from none
+      real(dp) :: stick_area = 0.0_dp           !! [1] fraction of the grid that sticks: its slip is zero to the tolerance
       real(dp) :: sliding_speed = 0.0_dp        !! [m/s] mean speed of the road over the rubber's surface along the road's velocity
       real(dp) :: friction_viscous = 0.0_dp     !! [1] -mean(P dH/ds)/mean(P) along the road's velocity
       real(dp) :: friction = 0.0_dp             !! [1] apparent friction coefficient along the road's velocity

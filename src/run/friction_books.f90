@@ -83,7 +83,7 @@ contains
    subroutine mark_idle(state, slip, least)
       type(tangential_state_type), intent(inout) :: state
       real(dp), intent(in) :: slip(:, :, :)           !! m [nx, 2, rows]
-      real(dp), intent(in) :: least                   !! slip that the solver can tell from none, m
+      real(dp), intent(in) :: least                   !! least slip that exceeds the error of a solve, m
       integer :: i, j
 
       !$omp parallel do default(none) shared(state, slip, least) private(i, j)

@@ -26,7 +26,7 @@ class RowColumns:
     road_y: float  # displacement of the road along y, m
     traction_x: float  # mean tangential traction on the rubber along x, Pa
     traction_y: float  # mean tangential traction on the rubber along y, Pa
-    stick_area: float  # fraction of the grid that sticks: its slip cannot be told from none
+    stick_area: float  # fraction of the grid that sticks: its slip is zero to the tolerance
     sliding_speed: float  # mean speed of the road over the rubber's surface along the road's velocity, m/s
     friction_viscous: float  # -mean(P dH/ds)/mean(P) along the road's velocity
     friction: float  # apparent friction coefficient along the road's velocity
@@ -69,7 +69,7 @@ class HistoryColumns:
     road_y: NDArray[np.float64]  # displacement of the road along y, m
     traction_x: NDArray[np.float64]  # mean tangential traction on the rubber along x, Pa
     traction_y: NDArray[np.float64]  # mean tangential traction on the rubber along y, Pa
-    stick_area: NDArray[np.float64]  # fraction of the grid that sticks: its slip cannot be told from none
+    stick_area: NDArray[np.float64]  # fraction of the grid that sticks: its slip is zero to the tolerance
     sliding_speed: NDArray[np.float64]  # mean speed of the road over the rubber's surface along the road's velocity, m/s
     friction_viscous: NDArray[np.float64]  # -mean(P dH/ds)/mean(P) along the road's velocity
     friction: NDArray[np.float64]  # apparent friction coefficient along the road's velocity

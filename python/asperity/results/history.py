@@ -59,9 +59,10 @@ class Grid:
 class History(NamedValues, HistoryColumns):
     """The history of a run: a mapping from names to NumPy arrays with one value per row.
 
-    Row 0 is the initial state, and every jump or step adds a row. If the run is still writing, only
-    the rows that are complete in all columns are included. This version writes the columns of
-    `HistoryColumns`; older files may have fewer.
+    Row 0 is the state after the first jump, or the unloaded state if the run begins with a ramp;
+    every later jump or step adds a row. If the run is still writing, only the rows that are
+    complete in all columns are included. This version writes the columns of `HistoryColumns`; older
+    files may have fewer.
     """
 
     def __init__(self, columns: dict[str, NDArray[Any]], units: dict[str, str],
