@@ -169,7 +169,7 @@ contains
    end subroutine choose_output
 
    !> Do the steps of a run. A signal or the time limit stops it after the present step, with a
-   !> checkpoint; both also abandon a step that takes long. A signal to any process counts for all of
+   !> checkpoint; both also give up a step that takes long. A signal to any process counts for all of
    !> them, and the clock of the first process decides about the time limit.
    subroutine run_steps(case, error)
       type(case_type), intent(in) :: case

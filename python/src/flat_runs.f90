@@ -87,7 +87,7 @@ contains
    end subroutine run_open
 
    !> Do a row of the history. After an error the run must be closed. During the call some signals ask the run to
-   !> stop, as they do in the program; a row that is abandoned does not change the run. A signal that arrived is
+   !> stop, as they do in the program; a row that is given up does not change the run. A signal that arrived is
    !> sent again at the end, so that its usual handler receives it.
    subroutine run_step(handle, n, signals, finished, step, time, contact_area, friction, warnings, &
       status, message)
@@ -95,7 +95,7 @@ contains
       integer(c_int), intent(in) :: n
       integer(c_int), intent(in) :: signals(n)             !! their numbers
       integer(c_int), intent(out) :: finished              !! 1: no row is left
-      integer(c_int), intent(out) :: step                  !! -1: the row was abandoned
+      integer(c_int), intent(out) :: step                  !! -1: the row was given up
       real(c_double), intent(out) :: time, contact_area, friction
       character(len=20000), intent(out) :: warnings
       integer(c_int), intent(out) :: status

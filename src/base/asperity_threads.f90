@@ -14,7 +14,7 @@ contains
    !> SLURM_CPUS_PER_TASK, which Slurm sets for a task. If neither is set, all processors are used, shared
    !> equally with the other processes of this run on this machine.
    subroutine set_threads(n)
-      integer, intent(in) :: n
+      integer, intent(in) :: n      !! threads; 0: as the environment decides
 
       if (n > 0) then
          call omp_set_num_threads(n)

@@ -1,4 +1,4 @@
-!> Decides whether the present computation must be abandoned because a stop was requested.
+!> Decides whether the present computation must be given up because a stop was requested.
 !>
 !> A solve may take minutes. A caller that can return to the state before the solve begins a watch, and
 !> solvers call `stop_is_due` once in each iteration; without a watch the answer is no. If a stop is due, the
@@ -46,7 +46,7 @@ contains
       asperity_stop_question => null()
    end subroutine end_watch
 
-   !> Must the present computation be abandoned? Collective.
+   !> Must the present computation be given up? Collective.
    function stop_is_due() result(due)
       logical :: due
 

@@ -52,9 +52,9 @@ contains
 
    !> Make a grid; the caller has checked that all numbers are positive.
    pure function new_grid(nx, ny, lx, ly, boundary) result(self)
-      integer, intent(in) :: nx, ny
-      real(dp), intent(in) :: lx, ly
-      integer, intent(in) :: boundary
+      integer, intent(in) :: nx, ny         !! cells along each side
+      real(dp), intent(in) :: lx, ly        !! sides, m
+      integer, intent(in) :: boundary       !! boundary_periodic or boundary_free
       type(grid_type) :: self
 
       self%nx = nx

@@ -33,8 +33,8 @@ contains
    !> Read a case from a file. If there are several processes, the first one reads the file, and all of them
    !> interpret the text. Collective.
    subroutine read_case(path, case, error)
-      character(*), intent(in) :: path
-      type(case_type), intent(out) :: case
+      character(*), intent(in) :: path                         !! of the input file
+      type(case_type), intent(out) :: case                     !! with defaults filled in
       type(error_type), allocatable, intent(out) :: error      !! all faults, one per line
       character(:), allocatable :: text
 
@@ -50,9 +50,9 @@ contains
 
    !> Read a case from a text.
    subroutine parse_case(text, path, case, error)
-      character(*), intent(in) :: text
+      character(*), intent(in) :: text                         !! of an input file, lines and all
       character(*), intent(in) :: path                         !! the file's name, for messages and results
-      type(case_type), intent(out) :: case
+      type(case_type), intent(out) :: case                     !! with defaults filled in
       type(error_type), allocatable, intent(out) :: error      !! all faults, one per line
       type(group_values_type), allocatable :: groups(:)
       type(group_values_type) :: group

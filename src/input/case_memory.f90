@@ -61,7 +61,7 @@ contains
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
       if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
 
-      ! Copies of the pressure and the gap before a row that may be abandoned (module row_stop). The copies of
+      ! Copies of the pressure and the gap before a row that may be given up (module row_stop). The copies of
       ! friction are counted with its other fields.
       copies = kept_arms(case, cells)
       if (count_rows(case%phases) > 1 .and. .not. rubs) copies = copies + 16.0_dp*cells

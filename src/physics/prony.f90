@@ -1,4 +1,4 @@
-!> Linear viscoelastic solids as Prony series: a spring and Maxwell arms in parallel.
+!> Linear viscoelastic solids as Prony series: a spring parallel to arms.
 !>
 !> G(t) = G_e + sum g exp(-t/tau), with the long-term modulus G_e, the moduli g and the relaxation
 !> times tau of the arms. A Zener branch, a spring G_0 in series with a spring G_1 parallel to a

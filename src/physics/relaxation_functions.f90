@@ -1,4 +1,4 @@
-!> Integrals over one time step of a Maxwell arm, as functions of x = dt/tau.
+!> Integrals over one time step of an arm, as functions of x = dt/tau.
 !>
 !> With s the time in units of the step, the arm relaxes as exp(-x s), and the displacement moves at
 !> the rate dU + K (s - 1/2), a parabola. Each function is a power series for small x and a closed

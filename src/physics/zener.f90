@@ -1,7 +1,7 @@
 !> A viscoelastic half-space or layer in time: the material and its schemes.
 !>
 !> U = A S, with A the elastic operator for a unit shear modulus and S the traction that would hold
-!> the displacement U elastically. Each Maxwell arm k carries the traction p_k; the whole is
+!> the displacement U elastically. Each arm k carries the traction p_k; the whole is
 !>
 !>    P = G_e S + sum p_k                                            (thesis, section 2.1.3)
 !>    p_k' = alpha p_k + b1 (S' - S) + b2 (S - S_old)                one step; a prime marks its end

@@ -151,7 +151,7 @@ contains
    end subroutine find_heights
 
    !> Do the next row. If the solvers do not converge, the state that they have reached is kept. After a row that
-   !> was abandoned (`stop%given_up`) the state is that of the row before.
+   !> was given up (`stop%given_up`) the state is that of the row before.
    subroutine advance(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error

@@ -104,7 +104,7 @@ contains
    end subroutine resume
 
    !> Do a row, and write what is due. A row with the status error_convergence is kept, too. A row that is
-   !> abandoned because a stop was requested does not change the run.
+   !> given up because a stop was requested does not change the run.
    subroutine step_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
@@ -194,7 +194,7 @@ contains
 
    !> Stop between two steps: write a snapshot of the present state, and a checkpoint. A restart removes a
    !> snapshot that was not due, so that the result equals that of a run that never stopped. After a row that was
-   !> abandoned, or a restart without a new row, there is no snapshot, because the slip is not part of the state.
+   !> given up, or a restart without a new row, there is no snapshot, because the slip is not part of the state.
    subroutine interrupt_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error

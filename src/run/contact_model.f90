@@ -45,7 +45,7 @@ module contact_model
       type(zener_type) :: material                  !! with the coefficients of the present step
       type(interpolation_type) :: road              !! the original map
       type(workspace_type) :: work                  !! scratch fields of the stages of a step
-      type(row_stop_type) :: stop                   !! abandons a row if a stop is requested
+      type(row_stop_type) :: stop                   !! gives up a row if a stop is requested
       real(dp), allocatable :: height(:, :)         !! H under the rubber in the present step, m
       real(dp), allocatable :: slope_x(:, :)        !! of the road under the rubber, -
       real(dp), allocatable :: slope_y(:, :)

@@ -1,9 +1,9 @@
 !> Checks whether the cells are small enough to resolve the patches of contact.
 !>
 !> If a contact has few cells, the error of its approach depends on the position of its summit among the cells
-!> (`tools/campaign_contact.py hertz`). For a single round patch the error is up to 9 % if it is two to three cells
-!> across, up to 1.5 % at four to five and a half, and less than 1 % beyond; for a line it is up to 2 % at four
-!> cells and up to 1.2 % at five. On a road the positions of the patches differ, and their errors average out. The
+!> (`tools/campaign_contact.py hertz 600`). For a single round patch the error is up to 28 % if it is two to three
+!> cells across, up to 1.3 % at four to five and a half, and less than 1 % beyond; for a line it is up to 2.1 % at
+!> four cells and up to 1.0 % at five. On a road the positions of the patches differ, and their errors average out. The
 !> error of a patch is about proportional to the inverse square of the cells across it, and that of the mean of n
 !> patches to the inverse root of n, so that n patches need fewer cells by the fourth root of n. At least three cells
 !> are needed: the contact area of a road is then still 10 % or more above that of a fine

@@ -1,7 +1,7 @@
-!> Abandons the present row if a stop is requested.
+!> Gives up the present row if a stop is requested.
 !>
 !> A row may take minutes if the contact is large or if the passes do not settle. After a request to stop, the row
-!> may continue for the time `patience`. If it has not ended by then, it is abandoned, and the state is that of
+!> may continue for the time `patience`. If it has not ended by then, it is given up, and the state is that of
 !> the row before. The normal and the tangential solver check this in each iteration (module `stop_watch`), and
 !> rows with friction also between two passes.
 !>
@@ -10,9 +10,9 @@
 !> the gap are zero and need no copy. The fields that change only at the end of a step are not copied, because
 !> there may be many of them (the arms). A row whose step is solved in parts needs them, too, once a part is
 !> committed: `keep_more` copies them if they take no more than `most_more`. Otherwise such a row can only be
-!> abandoned during its first part.
+!> given up during its first part.
 !>
-!> Several processes abandon a row together.
+!> Several processes give up a row together.
 module row_stop
    use arm_state, only : arm_state_type
    use asperity_parallel, only : any_process, global_max
@@ -29,9 +29,9 @@ module row_stop
 
    !> The function that reports a request to stop, and the state to return to.
    type :: row_stop_type
-      procedure(stop_question), pointer, nopass :: asked => null()   !! null: rows are never abandoned
+      procedure(stop_question), pointer, nopass :: asked => null()   !! null: rows are never given up
       real(dp) :: patience = 2.0_dp            !! time that a row may take after the request, s
-      logical :: given_up = .false.            !! the present row was abandoned
+      logical :: given_up = .false.            !! the present row was given up
       type(state_type), allocatable, private :: kept
       logical, private :: complete = .false.   !! `kept` has all fields
    contains
@@ -65,7 +65,7 @@ contains
       call move_steady_fields(aside, state)
       call move_step_fields(aside, state)
       call copy_large_fields(state, self%kept, status)
-      ! If there is not enough memory for the copies, the row is not abandoned.
+      ! If there is not enough memory for the copies, the row is not given up.
       if (any_process(status /= 0)) then
          deallocate (self%kept)
       else
@@ -125,7 +125,7 @@ contains
       call move_alloc(self%kept, state)
    end subroutine restore
 
-   !> Free the copies: the row has ended, or can no longer be abandoned.
+   !> Free the copies: the row has ended, or can no longer be given up.
    subroutine release(self)
       class(row_stop_type), intent(inout) :: self
 

@@ -364,10 +364,10 @@ contains
       call set_books(self%medium, dt, self%p_modes, none, books)
    end subroutine remember_normal
 
-   !> Do the same for the tangential side.
+   !> Set the state of the arms of the tangential side, and its stored energy.
    subroutine remember_tangential(self, dt, arms, books)
       class(steady_step_type), intent(inout) :: self
-      real(dp), intent(in) :: dt
+      real(dp), intent(in) :: dt                       !! of the step to come, s; 0: none
       type(arm_state_type), intent(inout) :: arms
       type(energy_books_type), intent(inout) :: books
       complex(dp) :: none(0:-1, 0:-1)

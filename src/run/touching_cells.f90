@@ -28,7 +28,7 @@ contains
       end do
    end subroutine mark_contact
 
-   !> Do the same if the share of its bound that each cell may carry is given.
+   !> Mark the cells that may carry friction: those whose share of the bound is above zero.
    subroutine mark_shares(share, contact)
       real(dp), intent(in) :: share(:, :)
       integer(int8), intent(inout) :: contact(:, :)   !! 0 open, 1 stick, 2 slip

@@ -89,7 +89,7 @@ module friction_cg_fast
 
 contains
 
-   !> Make the method for a half-space.
+   !> Make the method for the kernel of a solid.
    subroutine new_friction_fast(self, grid, kernel, error)
       type(friction_fast_type), intent(out) :: self
       type(grid_type), intent(in) :: grid

@@ -60,7 +60,7 @@ module friction_preconditioner
 
 contains
 
-   !> Make the preconditioner for a half-space.
+   !> Make the preconditioner for the kernel of a solid.
    subroutine new_friction_preconditioner(self, grid, kernel, error)
       type(friction_preconditioner_type), intent(out) :: self
       type(grid_type), intent(in) :: grid

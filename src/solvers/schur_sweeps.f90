@@ -78,7 +78,7 @@ contains
       end do
    end subroutine start_search_cells
 
-   !> The same for a later step: image = image + length response + coarse part;
+   !> Add a later step to the image and form its search direction: image = image + length response + coarse part;
    !> search = correction - diagonal image + beta search on N.
    pure subroutine search_cells(n, diagonal, length, beta, coarse, correction, residual, response, &
       image, search)
@@ -133,7 +133,7 @@ contains
       sums%square = sums%square + square
    end subroutine response_cells
 
-   !> Do the same for the last step, of which only the sum d e is needed.
+   !> Compute response = K search for the last step, of which only the sum d e is needed.
    pure subroutine last_response_cells(n, weights, south, search, north, response, sums)
       integer, intent(in) :: n
       real(sp), intent(in) :: weights(3)

@@ -64,7 +64,7 @@ contains
    !> The half-space in the normal direction. On a periodic grid the mean mode is 0, because the mean normal
    !> displacement is part of the approach of the bodies.
    function normal_half_space(poisson) result(self)
-      real(dp), intent(in) :: poisson
+      real(dp), intent(in) :: poisson               !! Poisson ratio, -1 < nu <= 0.5
       type(kernel_type) :: self
 
       self%poisson = poisson
@@ -74,7 +74,7 @@ contains
 
    !> The half-space in both tangential directions, or a block of some thickness, which has a mean shear.
    function tangential_half_space(poisson, thickness) result(self)
-      real(dp), intent(in) :: poisson
+      real(dp), intent(in) :: poisson               !! Poisson ratio, -1 < nu <= 0.5
       real(dp), intent(in), optional :: thickness   !! of the block, m; 0 or absent: half-space
       type(kernel_type) :: self
 

@@ -102,9 +102,8 @@ def friction_curve(
     draw : bool
         Draw random maps from the combined spectrum of the roads instead of cutting patches.
     extend : float, optional
-        Shortest wavelength (m) to which the spectrum of the road is extrapolated; shorter than all
-        waves of the spectrum.
-        ``friction_left_out`` is the friction that the omitted waves would add.
+        Shortest wavelength, m, to which the spectrum is extrapolated for ``friction_left_out``, the
+        friction that the omitted waves would add; shorter than all waves of the spectrum.
     wlf, reference, vertical, temperature_tolerance
         Options of the fit of a DMA table, see `asperity.dma.fit_dma`.
     tolerance : float
@@ -237,7 +236,7 @@ def run_curve(
     if means.slurm is not None and not means.resume:
         raise ValueError("resume = False (--no-resume): not with slurm (--slurm): the same call"
                          " must find the results of the jobs")
-    renewed: set[str] = set()  # with more patches, the runs of the first ones are not made again
+    renewed: set[str] = set()  # with more patches, the runs of the first ones are not repeated
     while True:
         curve = gather(plan, run_pieces(plan, Path(folder), means, quiet, renewed), extend)
         found = curve.largest_error

@@ -1,8 +1,8 @@
 """Grouping of the points of a DMA table into sweeps of the frequency at one temperature each.
 
-The temperature of an instrument drifts a little while it measures a sweep. A temperature at which
-the frequencies are measured anew begins another sweep; one at which the frequencies go on belongs
-to the same sweep. The mean temperature of a sweep counts for all its points.
+The temperature of an instrument drifts a little while it measures a sweep. If the frequencies are
+repeated at a temperature, another sweep begins; if they continue, the points belong to the same
+sweep. The mean temperature of a sweep counts for all its points.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ class FitErrors:
 
 
 class Prony:
-    """A viscoelastic solid in shear: a spring parallel to arms (a generalised Maxwell solid).
+    """A viscoelastic solid in shear: a spring parallel to Prony arms.
 
     Parameters
     ----------
@@ -150,6 +150,11 @@ class Prony:
         ndarray of complex
             G' + i G'', Pa, shape of `omega`.
 
+        Raises
+        ------
+        ValueError
+            If a frequency is not a finite number.
+
         Examples
         --------
         >>> complex(Prony(1.0, [2.0], [1.0]).complex_modulus(1.0))
@@ -173,6 +178,11 @@ class Prony:
         -------
         ndarray
             Pa, shape of `omega`.
+
+        Raises
+        ------
+        ValueError
+            If a frequency is not a finite number.
         """
         return self.complex_modulus(omega).real
 
@@ -188,6 +198,11 @@ class Prony:
         -------
         ndarray
             Pa, shape of `omega`.
+
+        Raises
+        ------
+        ValueError
+            If a frequency is not a finite number.
         """
         return self.complex_modulus(omega).imag
 
@@ -203,6 +218,11 @@ class Prony:
         -------
         ndarray
             Pure numbers, shape of `omega`.
+
+        Raises
+        ------
+        ValueError
+            If a frequency is not a finite number.
         """
         modulus = self.complex_modulus(omega)
         return modulus.imag / modulus.real
