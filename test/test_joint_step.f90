@@ -205,8 +205,8 @@ contains
          type(toy_system_type) :: new
 
          call new_toy_system(new, n)
-         call system%begin(state%s > 0.0_dp, state%s, 0.0_dp*state%s, state%t, 0.0_dp*state%s, 0.0_dp*state%s, 0.1_dp, &
-            other)
+         call system%begin(state%s > 0.0_dp, state%s, 0.0_dp*state%s, state%t, &
+            system%rules%has_jump(0.0_dp*state%s, 0.0_dp*state%s), 0.1_dp, other)
          system%root = new%root
          system%unit_length = new%unit_length
          system%unit_traction = new%unit_traction

@@ -177,7 +177,7 @@ contains
       end do
    end subroutine zero_load_just_touches
 
-   !> An approach without contact.
+   !> An approach without contact, and the first touch up to round-off.
    subroutine approach_that_does_not_reach(thesis)
       logical, intent(in) :: thesis
       type(grid_type) :: grid
@@ -194,6 +194,9 @@ contains
          call run_problem(grid, problem, h, s, thesis)
          call check_no_pressure(s, 'no contact')
          call check_close(minval(s%gap), 0.01_dp, 1e-14_dp, 'no contact: the distance')
+         problem%target = -maxval(h)*(1.0_dp - epsilon(1.0_dp))
+         call run_problem(grid, problem, h, s, thesis)
+         call check_no_pressure(s, 'an overlap that is round-off')
       end do
    end subroutine approach_that_does_not_reach
 

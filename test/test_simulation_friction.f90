@@ -44,6 +44,8 @@ contains
          call contact_sticks_until_the_road_moves()
       if (selected('first_slip_is_lost_in_full')) call first_slip_is_lost_in_full()
       if (selected('round_off_decides_nothing_after_a_stop')) call round_off_decides_nothing_after_a_stop()
+      if (selected('jump_leaves_a_sticking_block_as_it_is')) call jump_leaves_a_sticking_block_as_it_is()
+      if (selected('friction_begins_with_the_motion')) call friction_begins_with_the_motion()
       if (selected('cylinder_of_the_thesis')) call cylinder_of_the_thesis()
    end subroutine run_simulation_friction
 
@@ -108,6 +110,49 @@ contains
          end associate
       end do
    end subroutine round_off_decides_nothing_after_a_stop
+
+   !> A jump of the load does not move a block with mass that sticks in the whole cell: nothing changes but the pressure. All
+   !> displacements that the solver sees are then round-off, and must not count as a residual. The tractions of the wavy
+   !> road are uniform, those of the rough one with arms are not.
+   subroutine jump_leaves_a_sticking_block_as_it_is()
+      character(*), parameter :: roads(2) = [character(120) :: 'shape = ''sine'', amplitude = 1e-6, wavelength = 1e-3', &
+         'shape = ''self_affine'', hurst = 0.8, rms_slope = 0.05, wavelength_long = 1e-3, wavelength_short = 2.5e-4']
+      character(*), parameter :: arms(2) = [character(40) :: '', ', prony_g = 1e6, prony_tau = 1e-3']
+      character(*), parameter :: loads(2) = ['1.2e6', '0.8e6']
+      type(record_type) :: record
+      integer :: k, m
+
+      do k = 1, size(roads)
+         do m = 1, size(loads)
+            call run_case('&grid nx = 8, ny = 8, lx = 1e-3 /'//nl//'&surface '//trim(roads(k))//' /'//nl// &
+               '&material shear_modulus = 1e6, thickness = 1e-3, density = 1000.'//trim(arms(k))//' /'//nl// &
+               '&friction law = ''coulomb'', coefficient = 0.5 /'//nl// &
+               '&phase pressure = 1e6, duration = 1e-3, steps = 4, velocity_x = 1e-3 /'//nl// &
+               '&phase pressure = '//loads(m)//', duration = 1e-3, steps = 4, velocity_x = 1e-3 /', &
+               'jump while all sticks', record)
+            associate (rows => record%rows)
+               call check_close(rows(5)%contact_area, 1.0_dp, 0.0_dp, 'jump while all sticks: full contact')
+               call check_order(rows(4)%traction_x, '>', 900.0_dp, 'jump while all sticks: traction')
+               call check_close(rows(5)%traction_x, rows(4)%traction_x, 1e-9_dp*rows(4)%traction_x, &
+                  'jump while all sticks: the traction stays')
+               call check_that(rows(5)%iterations_tangential == 0, 'jump while all sticks: no iteration')
+            end associate
+         end do
+      end do
+   end subroutine jump_leaves_a_sticking_block_as_it_is
+
+   !> `friction` is 0 until the road has moved, also if the first phase moves it from its first row on.
+   subroutine friction_begins_with_the_motion()
+      type(record_type) :: record
+
+      call run_case('&grid nx = 16, ny = 16, lx = 1e-3 /'//nl//'&surface shape = ''self_affine'', hurst = 0.8, '// &
+         'wavelength_long = 5e-4, wavelength_short = 2.5e-4, rms_slope = 0.3, seed = 2 /'//nl// &
+         '&material shear_modulus = 1e6, thickness = 1e-3 /'//nl//'&friction law = ''coulomb'', coefficient = 0.3 /'//nl// &
+         '&phase pressure = 1e5, duration = 1e-3, steps = 2, velocity_x = 0.1 /', 'first motion', record)
+      call check_close(record%rows(0)%friction, 0.0_dp, 0.0_dp, 'friction before the first motion')
+      call check_close(record%rows(0)%friction_viscous, 0.0_dp, 0.0_dp, 'viscous friction before the first motion')
+      call check_order(record%rows(1)%friction, '>', 0.01_dp, 'friction of the first motion')
+   end subroutine friction_begins_with_the_motion
 
    !> The cylinder of thesis 3.5.1 in steady sliding. The viscous force is exact (Hunter 1961), 4.7106
    !> N/m; with it the totals are 154.71 N/m without slope and 166.89 N/m with it. At 96 cells over the

@@ -21,6 +21,7 @@ module asperity_simulation
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
    use history_table, only : row_values
+   use normal_state, only : reason_undetermined
    use pulled_road, only : guess_road, pull_outcome, place_pulled_road, watch_motion
    use rising_clock, only : seconds_now
    use road_motion, only : move_road
@@ -333,6 +334,7 @@ contains
       self%allowed = merge(outcome%required, self%case%solver%tolerance, outcome%required > 0.0_dp)
       self%residual = outcome%residual
       if (outcome%residual <= self%allowed .and. outcome%load_error > self%allowed) self%residual = outcome%load_error
+      if (outcome%reason == reason_undetermined) self%residual = 0.0_dp     ! no accuracy would help
    end subroutine note_outcome
 
    !> One sentence about a row that has not converged. It compares an error with the allowed one only if this error is

@@ -10,8 +10,9 @@
 !>    s = (b - t)/(b - t + |r|/a),   onset = b + s (t' - b),   loss = (onset + t')/2 |r|
 !>
 !> A cell that slips from the start on has b = t, so that s = 0, and the mean of both ends counts; this is of second
-!> order in the length of the step. A cell that enters or leaves the contact has no bound at one end. On a steep slope b
-!> may be infinite; b is therefore at most max(t, 2 t').
+!> order in the length of the step. On the slope of the road this is nearly so: b is taken with the slope at the end of the
+!> step, because that of the start is not kept. A cell that enters or leaves the contact has no bound at one end. On a
+!> steep slope b may be infinite; b is therefore at most max(t, 2 t').
 !>
 !> All of this is continuous in the tractions and the slip. Whether a cell was marked as sticking or slipping does not
 !> count, because this is round-off where the traction lies on its bound and the slip vanishes, for example when the

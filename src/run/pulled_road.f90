@@ -22,8 +22,11 @@ contains
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(inout) :: direction(2)
       real(dp) :: drive(2)
+      logical :: rests
 
-      drive = merge(0.0_dp, plan%velocity, plan%pulled)
+      ! A jump does not move a road that is driven. Before the first motion there is no direction.
+      rests = .not. (plan%dt > 0.0_dp .or. any(abs(direction) > 0.0_dp))
+      drive = merge(0.0_dp, plan%velocity, plan%pulled .or. rests)
       if (.not. any(abs(drive) > 0.0_dp)) drive = merge(plan%pull, 0.0_dp, plan%pulled)
       if (any(abs(drive) > 0.0_dp)) direction = drive/norm2(drive)
    end subroutine drive_direction

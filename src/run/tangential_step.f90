@@ -16,7 +16,7 @@ module tangential_step
    use asperity_errors, only : error_type
    use friction_books, only : book_friction, book_rest, mark_idle, rubbed_type
    use field_copies, only : copy_field
-   use field_sums, only : field_count, vector_sum
+   use field_sums, only : field_count, largest_of_rows, vector_sum
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
    use friction_law, only : contact_stick, friction_law_type, new_friction_law
@@ -34,6 +34,8 @@ module tangential_step
    private
 
    public :: new_tangential_step, tangential_step_type
+
+   real(dp), parameter :: resolved = 100.0_dp*epsilon(1.0_dp)   !! round-off of a product of the operator, relative
 
    !> The solver of the tangential side and the present step. A variable of this type must not be copied.
    type :: tangential_step_type
@@ -128,9 +130,11 @@ contains
       self%slip_expected = .false.
       state%moved = state%moved .or. any(abs(motion) > 0.0_dp) .or. any(pulled .and. abs(pull) > 0.0_dp)
       if (.not. state%moved) return
-      ! If the road returns to where it began, only round-off is left of the displacements. The least scale keeps it from
-      ! being the scale of the residual.
+      ! If the road returns to where it began, only round-off is left of the displacements, and if the load of a block with
+      ! mass jumps while all cells stick, nothing moves at all. The least scale keeps round-off from being the scale of the
+      ! residual.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
+      if (.not. self%solver%least_scale > 0.0_dp) self%solver%least_scale = round_off(self, state)/self%tolerance
       if (.not. dt > 0.0_dp) state%last_dt = 0.0_dp
       self%starts = .not. state%last_dt > 0.0_dp
       call past_traction(state%arms, material, self%past)
@@ -154,6 +158,22 @@ contains
          end do
       end if
    end subroutine begin
+
+   !> The round-off of DX' and of A T, in the units of DX'.
+   function round_off(self, state) result(size)
+      type(tangential_step_type), intent(in) :: self
+      type(tangential_state_type), intent(in) :: state
+      real(dp) :: size
+      real(dp), allocatable :: rows(:)
+      integer :: j
+
+      allocate (rows(self%grid%rows()))
+      !$omp parallel do default(none) shared(self, state, rows) private(j)
+      do j = 1, self%grid%rows()
+         rows(j) = max(self%q*maxval(abs(state%displacement(:, :, j))), self%compliance*maxval(abs(state%traction(:, :, j))))
+      end do
+      size = resolved*largest_of_rows(rows)
+   end function round_off
 
    !> Set the pull of the road in the solver. The part of the pull that T does not balance acts on slopes of the road:
    !> on all slopes if `slope_effect` is off, otherwise only on those outside the contact, through the attraction.

@@ -83,13 +83,17 @@ contains
 
       task = problem
       task%datum = highest
-      if (problem%control == control_approach) task%target = problem%target + highest
+      if (problem%control == control_approach) then
+         task%target = problem%target + highest
+         ! An approach that is only the round-off of this sum is the first touch, without a pressure.
+         if (abs(task%target) <= 2.0_dp*epsilon(1.0_dp)*(abs(problem%target) + abs(highest))) task%target = 0.0_dp
+      end if
       if (task%rms_height <= 0.0_dp) task%rms_height = field_rms(height, field_mean(height))
       determined = .true.
       if (problem%control == control_pressure) then
          moved = problem%target*max(grid%lx, grid%ly)/problem%modulus
       else
-         moved = abs(problem%target + highest)
+         moved = abs(task%target)
          if (grid%boundary == boundary_periodic) determined = problem%target < -mean
       end if
       resolved = 10.0_dp*epsilon(1.0_dp)*(moved + highest - lowest)
