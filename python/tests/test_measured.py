@@ -177,6 +177,143 @@ def test_points_on_a_grid_with_holes(tmp_path):
         load(tmp_path / "points.xyz", unit="um")
 
 
+MARKS = ["***", "---", "--", "#N/A", "1.#QNAN", "-1.#IND", "NULL", "-nan(ind)", "#DIV/0!"]
+
+
+@pytest.mark.parametrize("separator", [" ", "\t", ";"])
+@pytest.mark.parametrize("mark", MARKS)
+def test_marks_of_missing_values_lose_no_line(tmp_path, mark, separator):
+    """Lines with such marks used to be left out of matrices without a separator."""
+    rows = [["1", "2", "3", "4", "5"], [mark, "3", "4", "5", "6"], ["3", "4", "5", mark, "7"],
+            ["4", "5", "6", "7", "8"], ["5", "6", "7", mark, "9"], ["6", "7", "8", "9", "10"]]
+    (tmp_path / "map.txt").write_text("\n".join(map(separator.join, rows)) + "\n")
+    found = load(tmp_path / "map.txt", unit="um", size=(5, 6), level="none")
+    plane = 1.0 + np.arange(5) + np.arange(6)[:, None]
+    known = np.array([[cell != mark for cell in row] for row in rows])
+    np.testing.assert_allclose(found.height[known], 1e-6 * plane[known], rtol=1e-12)
+    assert found.steps[0]["missing"] == 3
+    (tmp_path / "line.txt").write_text("\n".join(["1", "2", mark, "4", "3", "2"]) + "\n")
+    line = load(tmp_path / "line.txt", unit="um", size=6, level="none", max_missing=0.2)
+    np.testing.assert_allclose(line.height, [[1e-6, 2e-6, 3e-6, 4e-6, 3e-6, 2e-6]], rtol=1e-12)
+    (tmp_path / "scan.txt").write_text("\n".join(
+        f"{i / 2}{separator}{mark if i == 3 else i}" for i in range(8)) + "\n")
+    scan = load(tmp_path / "scan.txt", unit="um", level="none", max_missing=0.2)
+    np.testing.assert_allclose(scan.height, [1e-6 * np.arange(8.0)], rtol=1e-12)
+    assert scan.lx == pytest.approx(4e-6)
+
+
+def test_words_in_a_text_map_are_errors(tmp_path):
+    """The message names the line and the word, and two maps in one file are not joined."""
+    path = tmp_path / "map.txt"
+    given = {"unit": "um", "size": (5, 4), "level": "none"}
+    lines = ["1 2 3 4 5", "2 3 4 5 6", "3 4 5 6 9", "4 5 6 7 1"]
+    for text, words in (("2 o 4 5 6", "line 2: column 2 = 'o': must be a number"),
+                        ("end of data", "line 2: has 3 columns, must have 5 as line 1"),
+                        ("Map 2:", "line 2: has 2 columns, must have 5 as line 1")):
+        path.write_text("\n".join([lines[0], text, *lines[1:]]))
+        with pytest.raises(ValueError, match=words):
+            load(path, **given)
+    path.write_text("\n".join(["Map 1", *lines, "Map 2", *lines]))
+    with pytest.raises(ValueError, match="line 6: has 2 columns, must have 5 as line 2"):
+        load(path, **given)
+    path.write_text("\n".join(["x z", "0 1", "1 2", "2 3", "3 o", "4 5"]))
+    with pytest.raises(ValueError, match="line 5: column 2 = 'o': must be a number"):
+        load(path, unit="um")
+    path.write_text("\n".join([*lines[:1], "2 3 1,234 5 6", *lines[1:]]))
+    np.testing.assert_allclose(load(path, **given).height[1, 2], 1.234e-6)
+    path.write_text("\n".join([*lines[:1], "2 3 1,234 5.5 6", *lines[1:]]))
+    np.testing.assert_allclose(load(path, **given).height[1, 2], 1234e-6)
+
+
+@pytest.mark.parametrize("text, shape", [
+    ("1 2 3 4\n2 3 4 5\n3 4 5 6\n", (3, 4)), ("1\t2\t3\t4\n2\t3\t4\t5\n3\t4\t5\t6\n", (3, 4)),
+    ("1\n2\n3\n4\n", (1, 4)), ("0 1\n1 2\n2 3\n", (1, 3))])
+def test_a_byte_order_mark_loses_no_line(tmp_path, text, shape):
+    (tmp_path / "map.txt").write_text(text, encoding="utf-8-sig")
+    size = {(3, 4): (4, 3), (1, 4): 4, (1, 3): None}[shape]
+    assert load(tmp_path / "map.txt", unit="um", size=size, level="none").height.shape == shape
+
+
+def test_headers_of_text_maps_are_kept(tmp_path):
+    """Lengths and units are read although a value is missing, and so is each of two channels."""
+    path = tmp_path / "map.txt"
+    rows = "1 2 3 4\n2 --- 4 5\n3 4 5 6\n4 5 6 7\n"
+    head = "# Channel: {}\n# Width: 8 um\n# Height: 2 um\n# Value units: nm\n"
+    path.write_text(head.format("First") + rows + head.format("Second") + rows.replace("1", "9"))
+    for channel, corner in ((None, 1e-9), ("First", 1e-9), ("Second", 9e-9)):
+        found = load(path, channel=channel, level="none")
+        assert (found.unit, found.lx, found.ly) == ("nm", 8e-6, 2e-6)
+        assert found.height.shape == (4, 4) and found.height[0, 0] == pytest.approx(corner)
+    points = "# Lateral units: mm\n# Value units: um\n" + "".join(
+        f"{i} {j} {'***' if i == j == 2 else i + j}\n" for j in range(5) for i in range(4))
+    path.write_text(points)
+    found = load(path, level="none")
+    assert (found.unit, found.lx, found.ly) == ("um", 4e-3, 5e-3)
+    np.testing.assert_allclose(
+        found.height, 1e-6 * (np.arange(4) + np.arange(5)[:, None]), atol=1e-18)
+
+
+def test_a_width_alone_makes_square_pixels(tmp_path):
+    path = tmp_path / "map.txt"
+    path.write_text("# Width: 8 um\n# Value units: nm\n1 2 3 4\n2 3 4 5\n3 4 5 7\n")
+    found = load(path, level="none")
+    assert (found.lx, found.ly) == pytest.approx((8e-6, 6e-6))
+    found = load(path, level="none", size=(8e3, 5e3))
+    assert (found.lx, found.ly) == pytest.approx((8e-6, 5e-6))
+    found = load(path, level="none", size=(5e3, 8e3), transpose=True)
+    assert (found.lx, found.ly) == pytest.approx((5e-6, 8e-6)) and found.height.shape == (4, 3)
+    with pytest.raises(ValueError, match=r"size: .* has its own length along x, 8000 nm"):
+        load(path, size=(8.0, 5.0))
+
+
+@pytest.mark.parametrize("order", ["falling", "shuffled", "counted"])
+def test_points_of_a_line_scan_are_sorted(tmp_path, order):
+    """Falling x used to give negative lengths."""
+    x = 0.5 * np.arange(12)
+    table = np.column_stack([x, np.sin(x)])
+    if order == "counted":
+        table = np.column_stack([np.arange(1, 13), table])
+    elif order == "falling":
+        table = table[::-1]
+    else:
+        np.random.default_rng(1).shuffle(table)
+    np.savetxt(tmp_path / "line.txt", table)
+    found = load(tmp_path / "line.txt", unit="um", level="none")
+    np.testing.assert_allclose(found.height, [1e-6 * np.sin(x)], atol=1e-18)
+    assert found.lx == pytest.approx(6e-6) and found.ly == pytest.approx(0.5e-6)
+    np.savetxt(tmp_path / "line.txt", np.column_stack([1e-6 * x**1.5, x]))
+    with pytest.raises(ValueError, match="line scan with points at uneven distances"):
+        load(tmp_path / "line.txt", unit="m")
+
+
+@pytest.mark.parametrize("head", ["X;Y;valid\n[mm];[um];[1/0]\n", "Scan Parameters\nID,a\nScan Data"
+                                  "\n\nLateral um,Raw Micrometer,\n"])
+def test_profilers_files_lose_no_line(tmp_path, head):
+    """SurfaceTopography reads their headers, and used to leave out what was above a wrong value."""
+    end = ";1" if ";" in head else ","
+    separator = end[0]
+    rows = [f"{i / 2}{separator}{i % 3}{end}" for i in range(9)]
+    (tmp_path / "line.csv").write_text(head + "\n".join(rows) + "\n")
+    assert load(tmp_path / "line.csv", level="none").height.shape == (1, 9)
+    rows[4] = f"2.0{separator}***{end}"
+    (tmp_path / "line.csv").write_text(head + "\n".join(rows) + "\n")
+    with pytest.raises(ValueError, match="has 9 lines of numbers, but only 4 could be read"):
+        load(tmp_path / "line.csv", level="none")
+
+
+def test_one_column_and_impossible_heights_are_refused(tmp_path):
+    np.save(tmp_path / "map.npy", np.ones((1, 8)))  # x first
+    with pytest.raises(ValueError, match=r"has one cell along x: a run needs at least 2; transp"):
+        load(tmp_path / "map.npy", unit="um", size=(1, 8))
+    turned = load(tmp_path / "map.npy", unit="um", size=(8, 1), transpose=True)
+    assert turned.height.shape == (1, 8)
+    height = sample()
+    height[3, 5] = -np.finfo(float).max
+    np.save(tmp_path / "map.npy", height.T)
+    with pytest.raises(ValueError, match=r"height\[3, 5\] = -1\.79769e\+308 \(row 3, column 5"):
+        load(tmp_path / "map.npy", unit="um", size=(LX, LY))
+
+
 def test_own_files_are_imported_unchanged(tmp_path):
     """Files that `import` wrote and roads of results have rows along x, units and lengths."""
     topography(sample()).to_netcdf(str(tmp_path / "map.nc"))

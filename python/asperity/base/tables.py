@@ -8,7 +8,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["cells_of", "decimals", "heads_of_comment", "is_number", "text_lines"]
+__all__ = ["Rows", "cells_of", "decimals", "heads_of_comment", "is_comment", "is_missing",
+           "is_number", "text_lines", "text_of"]
 
 Rows = list[tuple[int, list[str]]]
 
@@ -16,6 +17,12 @@ _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 _THOUSANDS_BY_POINT = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+(?:[eE][-+]?\d+)?")
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+
+#: Errors of a spreadsheet in English and German; the sign # does not make a line of them a comment.
+_ERRORS = re.compile(r"#(?:n/?a|nv|null!|num!|zahl!|div/0!|value!|wert!|ref!|bezug!)", re.I)
+#: Marks of missing values by instruments, spreadsheets and programs.
+_MISSING = re.compile(r"-+|\*+|x|bad|n/?a|null|none|undefined|infinite|[-+]?inf"
+                      r"|[-+]?nan(?:\(\w*\))?|[-+]?\d\.#\w+", re.I)
 
 
 def text_lines(path: Path) -> list[tuple[int, str]]:
@@ -31,6 +38,23 @@ def text_lines(path: Path) -> list[tuple[int, str]]:
     ValueError
         If it is not a text file, or has no lines left.
     """
+    kept = [(at, line) for at, line in enumerate(text_of(path).splitlines(), 1)
+            if line.strip() and not is_comment(line)]
+    if not kept:
+        raise ValueError(f"{path}: is empty")
+    return kept
+
+
+def text_of(path: Path) -> str:
+    """Return a text file as a string, without a byte order mark.
+
+    Raises
+    ------
+    OSError
+        If the file is missing or is a folder.
+    ValueError
+        If it is not a text file.
+    """
     if not path.exists():
         raise OSError(f"{path}: there is no such file")
     if path.is_dir():
@@ -42,11 +66,30 @@ def text_lines(path: Path) -> list[tuple[int, str]]:
         text = data.decode("latin-1")
     if "\0" in text:
         raise ValueError(f"{path}: is not a text file")
-    kept = [(at, line) for at, line in enumerate(text.splitlines(), 1)
-            if line.strip() and not line.lstrip().startswith("#")]
-    if not kept:
-        raise ValueError(f"{path}: is empty")
-    return kept
+    return text
+
+
+def is_comment(line: str) -> bool:
+    """Return whether a line is a comment. Errors of a spreadsheet start with ``#``, too.
+
+    Examples
+    --------
+    >>> is_comment("# Width: 10 um"), is_comment("#N/A 2 3")
+    (True, False)
+    """
+    start = line.lstrip()
+    return start.startswith("#") and not _ERRORS.match(start)
+
+
+def is_missing(cell: str) -> bool:
+    """Return whether a cell marks a missing value.
+
+    Examples
+    --------
+    >>> [is_missing(cell) for cell in ("", "***", "#N/A", "-1.#IND", "-nan(ind)", "0", "1o")]
+    [True, True, True, True, True, False, False]
+    """
+    return not cell or bool(_MISSING.fullmatch(cell) or _ERRORS.fullmatch(cell))
 
 
 def cells_of(lines: Sequence[tuple[int, str]]) -> Rows:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
+import math
 import re
 import warnings
 from collections.abc import Iterator
@@ -15,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, positive
-from .map_files import own_map, text_map
+from ..base.tables import text_of
+from .map_files import own_map, text_map, text_table
+from .text_repair import repaired_matrix, with_height
 
 __all__ = ["UNITS", "channels", "read_map", "to_metres"]
 
@@ -27,6 +30,7 @@ _MICRO = {"\u00b5m": "um", "\u03bcm": "um", "\u00c5": "A", "\u212b": "A", "in": 
 _PARTS = {"mm": 1e3, "um": 1e6, "nm": 1e9, "pm": 1e12, "A": 1e10}  # exact, unlike 1e-6
 _HDF5 = "h5"            # format of HDF5 files of others, as SurfaceTopography calls it
 _SURFACE = "surface"    # dataset that `&surface file` reads by default, beside surface/height
+_LARGEST = 1e100        # heights above this would overflow in the statistics, in any unit
 _NEEDS = "pip install SurfaceTopography"
 
 
@@ -70,7 +74,7 @@ def _open(path: Path) -> Any:
         return own
     try:
         with _quiet():
-            reader = open_topography(str(path))
+            reader = open_topography(_readable(path))
     except Exception as error:  # readers of damaged files raise what they meet
         if type(error).__name__ != "CannotDetectFileFormat":
             raise OSError(f"{path}: cannot be read as a topography: {_reason(error)}") from None
@@ -88,9 +92,8 @@ def _open(path: Path) -> Any:
         raise OSError(f"{path}: was read as the format {reader.format()!r} and holds no heights:"
                       " an instrument's own file is needed, or a table of numbers; the grey values"
                       " of a picture have no unit")
-    if reader.format() == "xyz" and (named := _with_units(path)) is not None:
-        reader.close()
-        return named
+    if reader.format() in ("asc", "xyz"):
+        reader = _complete_text(reader, path)
     if _is_doubtful(reader, path):
         try:
             found = text_map(path)
@@ -104,16 +107,70 @@ def _open(path: Path) -> Any:
     return reader
 
 
-def _with_units(path: Path) -> Any:
-    """Return the map of a list of points whose heading names units, otherwise None.
+def _readable(path: Path) -> Any:
+    """Return the name of a file, or its text, if words in a matrix had to be replaced.
 
-    SurfaceTopography does not read such headings, and takes the heights in the unit of x.
+    SurfaceTopography reads the lines above a word again for each of them, which takes minutes for
+    large matrices.
     """
+    with path.open("rb") as file:
+        start = file.read(4096)
+    if b"\0" in start or start[1:4] == b"ISO":  # binary, or a text with a format of its own
+        return str(path)
     try:
-        found = text_map(path)
-    except (OSError, ValueError):
-        return None
-    return found if found.default_channel.unit is not None else None
+        text = repaired_matrix(path, 1)
+    except ValueError:
+        return str(path)
+    return str(path) if text is None else io.BytesIO(text.encode())
+
+
+def _complete_text(reader: Any, path: Path) -> Any:
+    """Return a reader that reads every line of a text file.
+
+    SurfaceTopography takes lines with words for headers, and all lines above them, if the file has
+    columns of points. It also takes heights in the unit of x where a heading names two units.
+    """
+    if reader.format() == "xyz":
+        with path.open("rb") as file:
+            special = file.read(20).startswith((b"X;Y;valid", b"Scan Parameters"))
+        if not special:
+            reader.close()
+            return text_map(path, "xyz")
+        lines, points = len(text_table(path)[0]), int(np.prod(reader.channels[0].nb_grid_pts))
+        if lines != points:
+            raise ValueError(f"{path}: has {lines} lines of numbers, but only {points} could be"
+                             " read: write nan for missing values")
+        return reader
+    text = repaired_matrix(path, len(reader.channels))
+    return reader if text is None else _reopened(reader, text)
+
+
+def _reopened(reader: Any, text: str) -> Any:
+    """Return a reader of the same format for another text, in place of a reader."""
+    from SurfaceTopography import open_topography
+
+    reader.close()
+    with _quiet():
+        return open_topography(io.BytesIO(text.encode()), format=reader.format())
+
+
+def _with_length_y(path: Path, reader: Any, chosen: Any, size: Any, y_first: bool) -> Any:
+    """Return a reader of a text matrix whose header gives only its length along x.
+
+    The length along y is that of `size`, if it is given, otherwise it makes the pixels square.
+    """
+    length = float(chosen.physical_sizes[0])
+    nx, ny = chosen.nb_grid_pts
+    other = length * ny / nx
+    if size is not None:
+        given, other = _size_of(path, chosen.dim, size, y_first)
+        if not math.isclose(given, length, rel_tol=1e-6):
+            raise ValueError(f"size: {path} has its own length along {'xy'[y_first]},"
+                             f" {length:g} {_unit_of(chosen.unit) or ''}".rstrip())
+    # The header may have another unit than the heights, in which lengths are given here.
+    factor = float(chosen.info["raw_metadata"]["physical_size_x"]) / length
+    text = repaired_matrix(path, len(reader.channels)) or text_of(path)
+    return _reopened(reader, with_height(text, other * factor))
 
 
 def _is_doubtful(reader: Any, path: Path) -> bool:
@@ -225,14 +282,7 @@ def read_map(
                 f"{path}: channel {chosen.channel_id!r} is a line scan with points at uneven"
                 " distances: a run needs a regular grid; interpolate it first, as with"
                 " SurfaceTopography's to_uniform")
-        named = _unit_of(chosen.unit)
-        if named is not None and named not in UNITS:
-            raise ValueError(f"{path}: has the unit {named!r}: must be one of {', '.join(UNITS)}")
-        if named is None and given is None:
-            raise ValueError(f"{path}: names no unit of length: give one (unit = 'um', --unit um)")
-        if named is not None and given is not None and named != given:
-            raise ValueError(f"unit = {given!r}: {path} has its own unit, {named!r}; `scale` scales"
-                             " the heights")
+        used = _used_unit(path, chosen, given)
         # The program reads the dataset `surface` with the shape (ny, nx), so that it has no other
         # meaning here. SurfaceTopography reads all datasets with x first.
         rows_first = reader.format() == _HDF5 and chosen.name == _SURFACE
@@ -241,13 +291,17 @@ def read_map(
                              " as `&surface file` reads it: leave transpose (--transpose) out; if"
                              " its first index runs along x, store it under another name")
         y_first = transpose or rows_first
+        if chosen.physical_sizes is not None and len(chosen.physical_sizes) < chosen.dim:
+            reader = _with_length_y(path, reader, chosen, size, y_first)
+            chosen, size = _choose(reader, path, channel), None
         arguments: dict[str, Any] = {}
         if chosen.physical_sizes is None:
             arguments["physical_sizes"] = _size_of(path, chosen.dim, size, y_first)
         elif size is not None:
             known = " x ".join(f"{float(length):g}" for length in chosen.physical_sizes)
-            raise ValueError(f"size: {path} has its own, {known} {named or ''}".rstrip())
-        if named is None:
+            named = _unit_of(chosen.unit) or ""
+            raise ValueError(f"size: {path} has its own, {known} {named}".rstrip())
+        if chosen.unit is None:
             arguments["unit"] = given
         try:
             heights, lengths, periodic, metadata = _heights(path, reader, chosen, arguments)
@@ -264,13 +318,39 @@ def read_map(
     array: FloatArray = np.ma.filled(np.ma.asarray(heights, dtype=float), np.nan)
     array = np.where(np.isfinite(array), array, np.nan)
     if array.ndim == 1:
-        return (array[None, :], [lengths[0], lengths[0] / array.size], periodic,
-                named or str(given), source)
-    if y_first:
+        array, lengths = array[None, :], [lengths[0], lengths[0] / array.size]
+    elif y_first:
         lengths.reverse()
     else:
         array = array.T
-    return array, lengths, periodic, named or str(given), source
+    _check_heights(path, array, transpose)
+    return array, lengths, periodic, used, source
+
+
+def _used_unit(path: Path, chosen: Any, given: str | None) -> str:
+    """Return the unit of a channel, or the given one if the file names none."""
+    named = _unit_of(chosen.unit)
+    if named is not None and named not in UNITS:
+        raise ValueError(f"{path}: has the unit {named!r}: must be one of {', '.join(UNITS)}")
+    if named is not None and given is not None and named != given:
+        raise ValueError(f"unit = {given!r}: {path} has its own unit, {named!r}; `scale` scales"
+                         " the heights")
+    used = named or given
+    if used is None:
+        raise ValueError(f"{path}: names no unit of length: give one (unit = 'um', --unit um)")
+    return used
+
+
+def _check_heights(path: Path, array: FloatArray, transpose: bool) -> None:
+    """Refuse a map of one column, and heights whose squares overflow."""
+    if array.shape[1] < 2:
+        where = "" if transpose or array.size < 2 else "; transpose (--transpose) turns the map"
+        raise ValueError(f"{path}: has one cell along x: a run needs at least 2{where}")
+    impossible = np.abs(array) > _LARGEST
+    if impossible.any():
+        j, i = np.argwhere(impossible)[0]
+        raise ValueError(f"{path}: height[{j}, {i}] = {array[j, i]:.6g} (row {j}, column {i}, from"
+                         " 0): is too large for a height; if it marks a missing value, write nan")
 
 
 def _heights(

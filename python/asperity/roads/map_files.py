@@ -8,6 +8,7 @@ be missing.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,19 +22,21 @@ from ..base.tables import (
     cells_of,
     decimals,
     heads_of_comment,
+    is_missing,
     is_number,
     text_lines,
+    text_of,
 )
 
-__all__ = ["PlainReader", "own_map", "text_map"]
+__all__ = ["PlainReader", "is_value", "own_map", "row_of_numbers", "text_map", "text_table"]
 
 FloatArray = NDArray[np.float64]
 
-_MISSING = {"", "nan", "bad", "-", "--", "---", "***", "*", "x", "n/a", "na", "#n/a", "null", "inf",
-            "-inf", "infinite", "1.#qnan", "-1.#ind", "undefined"}
 _METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 _OFF_GRID = 0.1  # largest distance of a point from a regular grid, cells
 _SPARSE = 20.0  # most cells per point that still count as a grid
+_UNEVEN = ("is a line scan with points at uneven distances: a run needs a regular grid; interpolate"
+           " it first, as with numpy.interp")
 _NO_GRID = ("lie on no regular grid: interpolate them first, as with scipy.interpolate.griddata,"
             " and write the matrix of heights")
 
@@ -157,34 +160,73 @@ def own_map(path: Path) -> PlainReader | None:
     return PlainReader("asperity", PlainMap(array, "surface/height", (lx, ly), "m", periodic, info))
 
 
-def text_map(path: Path) -> PlainReader:
+def text_map(path: Path, kind: str = "text") -> PlainReader:
     """Return the map of a text file: a matrix of heights, or columns x, z or x, y, z.
+
+    A column of x, y, z that counts the points is left out, if the other two are a line scan.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        Name of its format.
 
     Raises
     ------
     ValueError
         If the file is not such a table, or the points are not on a regular grid.
     """
+    table, head = text_table(path)
+    columns = table.shape[1]
+    if columns > 3:
+        return PlainReader(kind, PlainMap(table.T.copy(), "Default"))
+    if columns == 1:
+        return PlainReader(kind, PlainMap(table[:, 0], "Default"))
+    units = (_units(head or heads_of_comment(path, columns))
+             or _units_of_comments(path, columns))
+    unit = None
+    if len(units) == columns:
+        table[:, :-1] *= [_METRES[one] / _METRES[units[-1]] for one in units[:-1]]
+        unit = units[-1]
+    if columns == 3 and len(table) > 1 and _is_a_count(table):
+        table = table[:, 1:]
+    return PlainReader(kind, _on_grid(path, table, unit))
+
+
+def text_table(path: Path) -> tuple[FloatArray, list[str]]:
+    """Return the numbers of a text file, NaN where missing, and the heading of the columns.
+
+    Raises
+    ------
+    ValueError
+        If the file holds no table, or a word that is no number and no mark of a missing value, or
+        lines of different lengths. The message contains the line.
+    """
     rows = decimals(cells_of(text_lines(path)))
     first = next((i for i, (_, cells) in enumerate(rows)
-                  if any(map(is_number, cells)) and all(map(_is_value, cells))), None)
+                  if any(map(is_number, cells)) and all(map(is_value, cells))), None)
     if first is None:
         raise ValueError(f"{path}: holds no table of numbers")
     body = rows[first:]
     while all(len(cells) > 1 and cells[-1] == "" for _, cells in body):
         body = [(line, cells[:-1]) for line, cells in body]  # all lines end with a separator
-    table = _numbers(path, body)
-    columns = table.shape[1]
-    if columns > 3:
-        return PlainReader("text", PlainMap(table.T.copy(), "Default"))
-    if columns == 1:
-        return PlainReader("text", PlainMap(table[:, 0], "Default"))
-    units = _units(rows[first - 1][1] if first else heads_of_comment(path, columns))
-    unit = None
-    if len(units) == columns:
-        table[:, :-1] *= [_METRES[one] / _METRES[units[-1]] for one in units[:-1]]
-        unit = units[-1]
-    return PlainReader("text", _on_grid(path, table, unit))
+    return _numbers(path, body), rows[first - 1][1] if first else []
+
+
+def _is_a_count(table: FloatArray) -> bool:
+    """Return whether the first of three columns counts the points of a line scan."""
+    return bool(np.all(np.diff(table[:, 0]) == 1.0) and np.all(np.diff(table[:, 1]) != 0.0))
+
+
+def _units_of_comments(path: Path, columns: int) -> list[str]:
+    """Return the units of the columns that Gwyddion writes into comments, or an empty list."""
+    text = text_of(path)
+    found = [re.search(rf"(?m)^#\s*{name} units:\s*(\S+)", text) for name in ("Lateral", "Value")]
+    units = [re.sub("[µμ]", "u", one[1]) for one in found if one]
+    if len(units) != 2 or not set(units) <= set(_METRES):
+        return []
+    return units[:1] * (columns - 1) + units[1:]
 
 
 def _units(head: list[str]) -> list[str]:
@@ -200,9 +242,9 @@ def _units(head: list[str]) -> list[str]:
     return [unit for unit in units if unit in _METRES]
 
 
-def _is_value(cell: str) -> bool:
-    """Return whether a cell is a number or a word for a missing value."""
-    return cell.lower() in _MISSING or is_number(cell)
+def is_value(cell: str) -> bool:
+    """Return whether a cell is a number or a mark of a missing value."""
+    return is_missing(cell) or is_number(cell)
 
 
 def _numbers(path: Path, rows: Rows) -> FloatArray:
@@ -210,17 +252,45 @@ def _numbers(path: Path, rows: Rows) -> FloatArray:
     width = len(rows[0][1])
     values = np.full((len(rows), width), np.nan)
     for row, (line, cells) in enumerate(rows):
-        if len(cells) != width:
-            raise ValueError(f"{path}: line {line}: has {len(cells)} columns, must have {width} as"
-                             f" line {rows[0][0]}")
-        for column, cell in enumerate(cells):
-            if cell.lower() in _MISSING:
-                continue
-            try:
-                values[row, column] = float(cell)
-            except ValueError:
+        values[row] = row_of_numbers(path, line, cells, width, rows[0][0])
+    return values
+
+
+def row_of_numbers(path: Path, line: int, cells: list[str], width: int, first: int
+                   ) -> list[float]:
+    """Return the numbers of a line of a table, NaN where a value is missing.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    line : int
+        Number of the line.
+    cells : list of str
+        Its cells, with decimal points.
+    width : int
+        Number of columns of the table.
+    first : int
+        Number of the first line of the table.
+
+    Raises
+    ------
+    ValueError
+        If the line has another number of columns, or a cell is neither a number nor a mark of a
+        missing value.
+    """
+    if len(cells) != width:
+        raise ValueError(f"{path}: line {line}: has {len(cells)} columns, must have {width} as"
+                         f" line {first}")
+    values = []
+    for column, cell in enumerate(cells):
+        try:
+            values.append(float(cell))
+        except ValueError:
+            if not is_missing(cell):
                 raise ValueError(f"{path}: line {line}: column {column + 1} = {cell!r}: must be a"
                                  " number") from None
+            values.append(math.nan)
     return values
 
 
@@ -232,8 +302,9 @@ def _on_grid(path: Path, table: FloatArray, unit: str | None) -> PlainMap:
     for axis, name in enumerate("xy"[: points.shape[1]]):
         index, step = _steps(points[:, axis])
         if index is None:
-            raise ValueError(f"{path}: the points {_NO_GRID}" if len(points) else
-                             f"{path}: has no point with {name}")
+            raise ValueError(f"{path}: has no point with {name}" if not len(points) else
+                             f"{path}: {_UNEVEN}" if points.shape[1] == 1 else
+                             f"{path}: the points {_NO_GRID}")
         places.append(index)
         counts.append(int(index.max()) + 1)
         sizes.append(counts[-1] * step)
