@@ -125,8 +125,51 @@ def test_saved_arrays(tmp_path, program):
     with pytest.raises(OSError, match="there is no folder"):
         asperity.surface.save(tmp_path / "no" / "road.h5", wave(), 1.0)
     run = asperity.run(tmp_path / "case.nml")
-    with h5py.File(tmp_path / "other.h5", "w") as file:
-        file["surface"] = np.zeros((3, 3))
-    assert asperity.surface.save(tmp_path / "other.h5", wave(), 1.0).exists()
     with pytest.raises(ValueError, match="is the result of a run"):
         asperity.surface.save(run.path, wave(), 1.0)
+
+
+def added_dataset(file):
+    file["measured"] = 1.0
+
+
+def added_to_the_map(file):
+    file["surface/colour"] = np.zeros((3, 3))
+
+
+def added_attribute(file):
+    file["surface/height"].attrs["owner"] = "me"
+
+
+def added_link(file):
+    del file["grid/x"]
+    file["grid/x"] = h5py.SoftLink("/grid/y")
+
+
+def other_program(file):
+    file.attrs["program"] = "Gwyddion"
+
+
+@pytest.mark.parametrize("change", [added_dataset, added_to_the_map, added_attribute, added_link,
+                                    other_program])
+def test_only_own_maps_are_replaced(tmp_path, change):
+    """A map that holds more than the package writes, or comes from elsewhere, is kept."""
+    path = asperity.surface.save(tmp_path / "road.h5", wave(), 1e-3)
+    assert asperity.surface.save(path, wave(), 1e-3) == path
+    with h5py.File(path, "a") as file:
+        change(file)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=r"road\.h5: exists and is not a height map of Asperity"):
+        asperity.surface.save(path, wave(), 1e-3)
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["surface", "surface/height"])
+def test_maps_of_other_programs_are_kept(tmp_path, name):
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file[name] = np.zeros((3, 3))
+    with pytest.raises(ValueError, match=r"map\.h5: exists and is not a height map of Asperity"):
+        asperity.surface.save(tmp_path / "map.h5", wave(), 1.0)
+    own = asperity.surface.load(tmp_path / "map.h5", unit="m" if name == "surface" else None,
+                                size=(1, 1), level="none").save(tmp_path / "own.h5")
+    assert asperity.surface.load(own).save(own) == own

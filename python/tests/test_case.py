@@ -347,7 +347,7 @@ def test_only_inputs_are_written_over(tmp_path):
     road = asperity.surface.save(tmp_path / "road.h5", np.zeros((4, 4)), lx=1.0)
     table = tmp_path / "dma.csv"
     table.write_text("f (Hz),G' (Pa),G'' (Pa)\n")
-    for path, words in ((result, "is the result of a run"), (road, "is a height map"),
+    for path, words in ((result, "is the result of a run"), (road, "is a height map of Asperity"),
                         (table, "exists and is not an input")):
         kept = path.read_bytes()
         with pytest.raises(ValueError, match=f"{path.name}: {words}: name another file"):

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
+import asperity
 from asperity import NotConverged
 from asperity.__main__ import main
 from asperity.dma import DmaTable, fit_dma, read_dma
@@ -600,7 +601,7 @@ def test_decimal_commas_between_blanks(tmp_path):
 
 
 def test_a_case_is_not_written_over(tmp_path, capsys):
-    """A file with other groups is a case; one with a material alone is an earlier fit."""
+    """A file with other groups is a case, and a material may be of somebody's hand."""
     table = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
                   sweeps([20.0], np.logspace(-1, 2, 9)))
     case = tmp_path / "case.nml"
@@ -608,9 +609,26 @@ def test_a_case_is_not_written_over(tmp_path, capsys):
     assert main(["fit", str(table), "-o", str(case)]) == 2
     assert "case.nml: holds &grid, &phase, too, and would be replaced" in capsys.readouterr().err
     assert case.read_text().startswith("&grid")
-    case.write_text("! of last week\n&material shear_modulus = 1e6 /\n")
-    assert main(["fit", str(table), "-o", str(case)]) == 0
-    assert "prony_g" in case.read_text()
+    by_hand = "! of last week\n&material shear_modulus = 1e6, density = 1200. /\n"
+    case.write_text(by_hand)
+    assert main(["fit", str(table), "-o", str(case)]) == 2
+    assert "case.nml: holds a &material that `asperity fit` has not" in capsys.readouterr().err
+    assert case.read_text() == by_hand
+    fitted = tmp_path / "fitted.nml"
+    for _ in "twice":
+        assert main(["fit", str(table), "-o", str(fitted)]) == 0
+    assert asperity.Case.read(fitted).material.prony_g
+    changed = fitted.read_text().replace("poisson = 0.5", "poisson = 0.4")
+    for text in (changed, fitted.read_text() + "! mine\n"):
+        fitted.write_text(text)
+        assert main(["fit", str(table), "-o", str(fitted)]) == 2
+        assert "or that was changed since" in capsys.readouterr().err
+        assert fitted.read_text() == text
+    notes = tmp_path / "notes.png"
+    notes.write_text("my notes")
+    assert main(["fit", str(table), "--plot", str(notes)]) == 2
+    assert "notes.png: exists and is not a picture" in capsys.readouterr().err
+    assert notes.read_text() == "my notes"
     assert main(["fit", str(table), "--plot", str(tmp_path / "none" / "a.png")]) == 3
     assert "a.png: cannot be written: there is no folder" in capsys.readouterr().err
 

@@ -31,6 +31,9 @@ def test_a_film_has_a_frame_for_each_snapshot(road, tmp_path, monkeypatch, capsy
         assert np.abs(np.asarray(picture.convert("L"), dtype=float) - first).max() > 50
     assert main(["plot", str(road / "road.h5"), "--film", "pressure", "-o", "x.png"]) == 2
     assert "must be .gif or .mp4" in capsys.readouterr().err
+    (tmp_path / "notes.gif").write_text("my notes")
+    assert main(["plot", str(road / "road.h5"), "--film", "-o", "notes.gif"]) == 2
+    assert "notes.gif: exists and is not a picture or a film" in capsys.readouterr().err
 
 
 def test_a_film_of_few_frames_is_slow_enough_to_be_seen(road, tmp_path):

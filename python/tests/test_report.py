@@ -315,6 +315,12 @@ def test_command(result, tmp_path, capsys):
     assert "case.nml: the name of a page must end in .html" in capsys.readouterr().err
     assert case.read_text() == "&grid /"
     assert asperity.open(result).finished
+    other = tmp_path / "other.html"
+    other.write_text("<!DOCTYPE html><title>asperity</title><p>my thesis")
+    assert main(["report", str(result), "-o", str(other)]) == 2
+    assert "other.html: exists and is not a page of Asperity" in capsys.readouterr().err
+    assert other.read_text().endswith("my thesis")
+    assert main(["report", str(result), "-o", str(tmp_path / "page.html")]) == 0  # once more
 
 
 needs_browser = pytest.mark.skipif(DRIVER is None or BROWSER is None,

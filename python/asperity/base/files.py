@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-__all__ = ["INPUT", "MAP", "MATERIAL", "RESULT", "SHIFTS", "SHIFTS_HEAD", "STATE", "check_folder",
-           "check_output", "kind_of", "make_folder", "new_file", "write_text"]
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["INPUT", "MAP", "MATERIAL", "PICTURE", "RESULT", "SHIFTS", "SHIFTS_HEAD",
+           "STATE", "WEB_PAGE", "check_folder", "check_output", "kind_of", "make_folder",
+           "new_file", "sealed", "write_text"]
 
 #: Kinds of file that the package and the program write, in the words of messages.
 INPUT = "an input"
-MAP = "a height map"
+MAP = "a height map of Asperity"
 MATERIAL = "a material that `asperity fit` writes"
+PICTURE = "a picture or a film"
 RESULT = "the result of a run"
 SHIFTS = "a table of shifts"
 STATE = "the state of a simulation"
+WEB_PAGE = "a page of Asperity"
 
 #: First line of a table of shifts.
 SHIFTS_HEAD = "temperature,log10_a_t,a_t,b_t"
 
 _HEAD = 65_536  # bytes of a text from which its kind is found
+_SEAL = "! asperity fit wrote the lines below; checksum "
+_GENERATOR = b'<meta name="generator" content="asperity '  # in the first lines of a page
+#: First bytes of pictures and films that matplotlib writes.
+_PICTURES = re.compile(
+    rb"\x89PNG|%PDF|%!PS|GIF8|\xff\xd8\xff|II\*\0|MM\0\*|RIFF....WEBP|....ftyp|\x1f\x8b"
+    rb"|(?:<\?xml.{0,500})?(?:<!DOCTYPE svg|<svg)|%% Creator: Matplotlib", re.DOTALL)
+#: Everything that a file of a height map may contain. A part of the user's would be lost.
+_MAP_PARTS = {"grid", "grid/x", "grid/y", "source", "source/metadata", "surface", "surface/height"}
+_MAP_ATTRIBUTES = re.compile("title|program|version|created|source_\\w+|steps|steps_text|n[xy]"
+                             "|l[xy]|boundary|units|long_name|rms_height|rms_slope")
 
 
 def kind_of(path: Path) -> str:
@@ -44,7 +62,7 @@ def kind_of(path: Path) -> str:
         try:
             with h5py.File(path, "r", locking=False) as file:
                 found = {RESULT: "history" in file, STATE: "steered" in file.attrs,
-                         MAP: "surface" in file}
+                         MAP: _is_map(file)}
         except OSError:  # the file is damaged
             return ""
         return next((kind for kind, holds in found.items() if holds), "")
@@ -52,10 +70,56 @@ def kind_of(path: Path) -> str:
         head = text.read(_HEAD)
     if head.startswith(SHIFTS_HEAD.encode()):
         return SHIFTS
+    if _PICTURES.match(head):
+        return PICTURE
+    if _GENERATOR in head[:2000]:
+        return WEB_PAGE
     groups = {name.lower() for name in re.findall(rb"(?m)^[ \t]*&([A-Za-z]\w*)", head)}
     if not groups or b"\0" in head:
         return ""
-    return MATERIAL if groups == {b"material"} else INPUT
+    return MATERIAL if groups == {b"material"} and _is_sealed(path) else INPUT
+
+
+def _is_map(file: h5py.File) -> bool:
+    """Return whether the package wrote a file of a height map, and nothing was added to it."""
+    import h5py
+
+    def only_ours(group: h5py.Group, at: str) -> bool:
+        for name in group:
+            if (at + name not in _MAP_PARTS
+                    or not isinstance(group.get(name, getlink=True), h5py.HardLink)):
+                return False
+            part = group[name]
+            if not all(map(_MAP_ATTRIBUTES.fullmatch, part.attrs)):
+                return False
+            if isinstance(part, h5py.Group) and not only_ours(part, f"{at}{name}/"):
+                return False
+        return True
+
+    return (str(file.attrs.get("program", "")) in ("asperity", "asperity import")
+            and {"version", "created"} <= set(file.attrs) and "surface/height" in file
+            and all(map(_MAP_ATTRIBUTES.fullmatch, file.attrs)) and only_ours(file, ""))
+
+
+def sealed(text: str) -> str:
+    r"""Return the text of a material with a first line by which a later change is seen.
+
+    Examples
+    --------
+    >>> sealed("&material shear_modulus = 1e6 /\n").splitlines()[0]
+    '! asperity fit wrote the lines below; checksum 69f50688322b3ed6'
+    """
+    return f"{_SEAL}{_checksum(text)}\n{text}"
+
+
+def _is_sealed(path: Path) -> bool:
+    """Return whether a text is as `sealed` gave it, apart from the ends of lines."""
+    first, _, text = path.read_text(encoding="utf-8", errors="replace").partition("\n")
+    return first == _SEAL + _checksum(text)
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:16]
 
 
 def check_folder(path: Path) -> None:

@@ -8,7 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from ..base.files import INPUT, MATERIAL, check_folder, check_output, write_text
+from ..base.files import (
+    INPUT,
+    MATERIAL,
+    check_folder,
+    check_output,
+    kind_of,
+    sealed,
+    write_text,
+)
 
 __all__ = ["add_columns", "add_fit", "add_import", "columns_of"]
 
@@ -150,10 +158,7 @@ def _check_outputs(chosen: argparse.Namespace) -> None:
         known[place] = f"the file of {option}, too"
     if chosen.output is not None:
         check_output(chosen.output, MATERIAL, INPUT)
-        other = _other_groups(chosen.output)
-        if other:
-            raise ValueError(f"--output {chosen.output}: holds {other}, too, and would be replaced:"
-                             " name another file, and add the group from there")
+        _keep_input(chosen.output)
     if chosen.shifts is not None:
         check_shifts(chosen.shifts)
     if chosen.plot is not None:
@@ -161,13 +166,18 @@ def _check_outputs(chosen: argparse.Namespace) -> None:
         check_folder(chosen.plot)
 
 
-def _other_groups(path: Path) -> str:
-    """Return the groups of an input other than `&material`, or '' if there are none."""
-    if not path.is_file():
-        return ""
+def _keep_input(path: Path) -> None:
+    """Refuse an input that is not a material as a fit has written it."""
+    if not path.is_file() or not path.stat().st_size or kind_of(path) == MATERIAL:
+        return
     text = path.read_text(encoding="utf-8", errors="replace")
     found = dict.fromkeys(re.findall(r"(?im)^\s*(&[a-z]\w*)", text))
-    return ", ".join(name for name in found if name.lower() != "&material")
+    other = ", ".join(name for name in found if name.lower() != "&material")
+    if other:
+        raise ValueError(f"--output {path}: holds {other}, too, and would be replaced:"
+                         " name another file, and add the group from there")
+    raise ValueError(f"--output {path}: holds a &material that `asperity fit` has not written, or"
+                     " that was changed since, and would be replaced: name another file")
 
 
 def _fit(chosen: argparse.Namespace) -> int:
@@ -185,13 +195,13 @@ def _fit(chosen: argparse.Namespace) -> int:
         table, arms_per_decade=chosen.arms_per_decade, reference=chosen.reference,
         wlf=chosen.wlf, temperature_tolerance=chosen.temperature_tolerance,
         least_plateau=chosen.least_plateau, vertical=chosen.vertical)
-    group = fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature)
+    group = sealed(fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature) + "\n")
     messages = sys.stdout
     if output is None:
-        print(group)
+        print(group, end="")
         messages = sys.stderr  # the standard output then has nothing but the group
     else:
-        write_text(output, group + "\n")
+        write_text(output, group)
         print(fit.summary())
         print(f"wrote {output}")
     if chosen.shifts is not None:

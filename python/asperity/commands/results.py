@@ -61,6 +61,8 @@ def _plot(chosen: argparse.Namespace) -> int:
     if chosen.film is None:
         check_picture(chosen.output)
     run = open_result(chosen.result)
+    if chosen.film is None and chosen.output is None and not chosen.show:
+        check_picture(run.path.with_suffix(".png"))
     if chosen.film is not None:
         return _film(run, chosen)
     if chosen.field:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.files import write_text
+from ..base.files import WEB_PAGE, check_output, write_text
 from ..base.library import version
 from ..base.names import counted
 from ..results import open_result
@@ -49,13 +49,14 @@ def write_curve_page(curve: FrictionCurve, path: str | Path) -> Path:
     Raises
     ------
     ValueError
-        If the name does not end in .html.
+        If the name does not end in .html, or the file exists and is no page of Asperity.
     OSError
         If the page cannot be written.
     """
     target = Path(path)
     if target.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"{target}: the name of a page must end in .html")
+    check_output(target, WEB_PAGE)
     write_text(target, curve_page(curve))
     return target
 

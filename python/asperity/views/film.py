@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from PIL.Image import Dither, Image, Quantize
 
-from ..base.files import new_file
+from ..base.files import PICTURE, check_output, new_file
 from ..results.settings import has_friction
 from ..results.steady import steady_speeds
 from .colour_scales import field_style, mark_scale, state_style, without_open_cells
@@ -70,13 +70,14 @@ def film(run: Run, path: Path, field: str | None = None, *,
     Raises
     ------
     ValueError
-        If the file has another ending, or there are too few snapshots.
+        If the file has another ending, or exists and is no film, or there are too few snapshots.
     OSError
         If ffmpeg is missing for an .mp4.
     """
     path = Path(path)
     if path.suffix.lower() not in _ENDINGS:
         raise ValueError(f"{path}: the ending of a film must be .gif or .mp4")
+    check_output(path, PICTURE)
     if len(run.snapshots) < 2:
         raise ValueError(f"{run.path}: a film needs two snapshots or more:"
                          " `&output snapshot_every = 1 /` stores one for each row")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.durations import short_time
-from ..base.files import write_text
+from ..base.files import WEB_PAGE, check_output, write_text
 from ..base.library import version
 from ..base.names import counted
 from ..results.settings import has_friction, solver_setting
@@ -52,13 +52,14 @@ def write_report(run: Run, path: str | os.PathLike[str] | None = None) -> Path:
     OSError
         If the result cannot be read or the page cannot be written.
     ValueError
-        If the name does not end in .html.
+        If the name does not end in .html, or the file exists and is no page of Asperity.
     """
     target = run.path.with_suffix(".html") if path is None else Path(path)
     if target.suffix.lower() in (".h5", ".hdf5"):
         raise ValueError(f"{target}: the page would overwrite a result: name a file .html")
     if target.suffix.lower() not in (".html", ".htm") and not target.is_dir():
         raise ValueError(f"{target}: the name of a page must end in .html")
+    check_output(target, WEB_PAGE)
     text = report_page(run)
     write_text(target, text)
     return target

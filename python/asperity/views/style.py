@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.files import new_file
+from ..base.files import PICTURE, check_output, new_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,16 +92,25 @@ LABELS = {
 
 
 def check_picture(path: Path | None) -> None:
-    """Raise ValueError if matplotlib cannot write a file with this ending; None is accepted."""
+    """Refuse a file that matplotlib cannot write, or that is no picture; None is accepted.
+
+    Raises
+    ------
+    ValueError
+        If the ending is not one of matplotlib's, or the file exists and is no picture.
+    """
     from matplotlib.backend_bases import FigureCanvasBase
 
     if path and path.suffix[1:].lower() not in FigureCanvasBase.get_supported_filetypes():
         raise ValueError(f"{path}: the ending must be .png, .pdf, .svg or another that matplotlib"
                          " writes")
+    # Raw pixels have no mark by which they could be recognised.
+    if path and path.suffix.lower() not in (".raw", ".rgba"):
+        check_output(path, PICTURE)
 
 
 def save_picture(figure: Figure, path: Path, dpi: int) -> None:
-    """Write a figure."""
+    """Write a figure. `check_picture` has allowed the file."""
     with new_file(path) as new:
         figure.savefig(new, dpi=dpi)
 
