@@ -173,3 +173,22 @@ def test_maps_of_other_programs_are_kept(tmp_path, name):
     own = asperity.surface.load(tmp_path / "map.h5", unit="m" if name == "surface" else None,
                                 size=(1, 1), level="none").save(tmp_path / "own.h5")
     assert asperity.surface.load(own).save(own) == own
+
+
+def test_line_scans_with_uneven_distances_are_refused(tmp_path):
+    """They used to be made even, which moved every point."""
+    topography = pytest.importorskip("SurfaceTopography")
+    x = np.arange(12.0) ** 1.5
+    scan = topography.NonuniformLineScan(x, np.sin(x), unit="um")
+    for use in (lambda: asperity.surface.save(tmp_path / "line.h5", scan),
+                lambda: asperity.Case(surface=scan)):
+        with pytest.raises(ValueError, match="line scan with points at uneven distances"):
+            use()
+    assert not list(tmp_path.iterdir())
+
+
+def test_maps_of_one_column_are_refused(tmp_path):
+    for use in (lambda: asperity.surface.save(tmp_path / "map.h5", np.ones((3, 1)), 1e-3),
+                lambda: asperity.Case(surface=np.ones((3, 1)))):
+        with pytest.raises(ValueError, match=r"has shape \(3, 1\), \(ny, nx\): nx must be at lea"):
+            use()

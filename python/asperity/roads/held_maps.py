@@ -57,16 +57,27 @@ def _is_topography(value: object) -> bool:
 def _map_of(value: Any, name: str = "surface") -> HeldMap:
     """Return an array or a topography as a map in metres, in which summits are maxima."""
     if not _is_topography(value):
-        return HeldMap(library.height_map(value, name), None, None, None)
+        return HeldMap(_with_cells(library.height_map(value, name), name), None, None, None)
+    if not getattr(value, "is_uniform", True):
+        raise ValueError(f"{name}: is a line scan with points at uneven distances: a run needs a"
+                         " regular grid; interpolate it first, as with topography.to_uniform")
     unit = getattr(value, "unit", None)
     if unit is None:
         raise ValueError(f"{name}: the topography has no unit: give it one, as"
                          " topography.to_unit('m') or by its constructor")
     sizes = to_metres(np.ravel(value.physical_sizes), unit)
     heights = np.asarray(to_metres(np.ma.filled(value.heights(), np.nan), unit), dtype=float)
-    height = library.height_map(np.atleast_2d(heights.T), name)
+    height = _with_cells(library.height_map(np.atleast_2d(heights.T), name), name)
     ly = float(sizes[1]) if len(sizes) > 1 else None
     return HeldMap(height, float(sizes[0]), ly, bool(getattr(value, "is_periodic", False)))
+
+
+def _with_cells(height: NDArray[np.float64], name: str) -> NDArray[np.float64]:
+    """Return a map (ny, nx), or refuse one with a single cell along x."""
+    if height.shape[1] < 2:
+        raise ValueError(f"{name}: has shape {height.shape}, (ny, nx): nx must be at least 2; a"
+                         " profile is a row along x")
+    return height
 
 
 def held_map(value: Any) -> Path:
