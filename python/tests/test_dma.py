@@ -749,3 +749,17 @@ def test_moduli_that_differ_at_one_frequency_are_reported(tmp_path):
                  [row[:3] for k in range(3) for row in sweeps((20.0,), np.geomspace(0.1, 10.0, 5),
                                                               0.03 * k)])
     assert read_dma(path).notes == []
+
+
+def test_arguments_of_another_type_are_named(tmp_path):
+    path = write(tmp_path / "a.csv", "f (Hz),G' (Pa),G'' (Pa),T (C)",
+                 sweeps([20.0], np.logspace(-1, 2, 9)))
+    for columns, message in (
+            ({"storage": 1.5}, r"^columns: storage = 1\.5: must be the name of a column or its"),
+            ("a", "^columns = 'a': must be a dict of names or numbers by role$")):
+        with pytest.raises(ValueError, match=message):
+            read_dma(path, columns=columns)
+    with pytest.raises(ValueError, match=r"^table = 'a\.csv': must be a DmaTable$"):
+        fit_dma("a.csv")
+    with pytest.raises(ValueError, match=r"^wlf = 3\.0: must be \(c1, c2\) or \(c1, c2, t_ref\)$"):
+        fit_dma(read_dma(path), wlf=3.0)

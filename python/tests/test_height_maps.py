@@ -125,6 +125,8 @@ def test_threads():
     assert asperity.set_threads(1) == 1
     with pytest.raises(ValueError, match="number = -1"):
         asperity.set_threads(-1)
+    with pytest.raises(ValueError, match="number = 'a': must be an integer from 0"):
+        asperity.set_threads("a")
 
 
 def test_curvature_of_a_profile_is_its_second_derivative():

@@ -232,7 +232,11 @@ def test_plot_shows_units_and_legend():
         (lambda: Prony.from_zener(0.0, [1.0], [1.0], []), "eta: has 0 values"),
         (lambda: Prony(1.0).to_namelist(temperature=3.0), "give both"),
         (lambda: Prony(1.0).to_namelist(poisson=0.6), "poisson = 0.6"),
+        (lambda: Prony(1.0).to_namelist(temperature=20.0, wlf=3.0), r"wlf = 3.0: must be \(c1,"),
+        (lambda: Prony.fit([1.0] * 3, [1.0] * 3, [1.0] * 3, tau_range=1.0),
+         r"tau_range = 1.0: must be \(shortest, longest\)"),
         (lambda: master_curve([1.0], [[1.0]], [[1.0]], [[1.0]], 2.0), "reference = 2.0"),
+        (lambda: master_curve([1.0, 2.0], 1.0, 1.0, 1.0, 1.0), "omega = 1.0: must be a list of 2"),
     ],
 )
 def test_wrong_values_are_named(call, message):

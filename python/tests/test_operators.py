@@ -115,3 +115,19 @@ def test_wrong_shapes_and_values():
     with pytest.raises(ValueError, match="poisson"):
         asperity.operators.tangential(8, 4, 1.0, modulus=1.0, poisson=0.7)
     assert "8 x 4 cells" in repr(op)
+
+
+def test_options_are_checked():
+    for wrong in (-1.0, np.nan, np.inf, None, "a"):
+        with pytest.raises(ValueError, match=r"^thickness = .*: must be a finite number >= 0$"):
+            asperity.operators.tangential(8, 4, 1.0, modulus=1.0, thickness=wrong)
+    cases = [(asperity.operators.normal(8, 4, 1.0, modulus=1.0, boundary=boundary), (4, 8))
+             for boundary in ("periodic", "free")]
+    cases.append((asperity.operators.tangential(8, 4, 1.0, modulus=1.0), (2, 4, 8)))
+    for op, shape in cases:
+        for wrong in (0.0, -1.0, np.nan, 1.0):
+            with pytest.raises(ValueError, match=r"^tolerance = .*: must be a finite number > 0"):
+                op.inverse(np.ones(shape), tolerance=wrong)
+        for wrong in (-3, 0, 2.5):
+            with pytest.raises(ValueError, match=r"^max_iterations = .*: must be a positive int"):
+                op.inverse(np.ones(shape), max_iterations=wrong)

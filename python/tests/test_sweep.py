@@ -437,3 +437,19 @@ def test_a_long_table_is_cut():
     assert len(lines) == 33 and lines[-1] == "and 10 more rows"
     assert lines[2].split() == ["0", "1"]
     assert table._repr_html_().count("<td") == 60
+
+
+def test_wrong_types_are_found_before_the_runs(tmp_path):
+    case = asperity.Case(grid=dict(nx=8, ny=1, lx=1.0), material=dict(shear_modulus=1e6),
+                         surface=dict(shape="sine", amplitude=1e-3, wavelength=1.0),
+                         phase=dict(pressure=1e3))
+    folder = tmp_path / "runs"
+    for options, message in (
+            (dict(measure=3), "measure = 3: must be a function of a run, or 'steady'"),
+            (dict(executor=3), r"executor = 3: must be a concurrent\.futures\.Executor")):
+        with pytest.raises(ValueError, match=f"^{message}$"):
+            asperity.sweep(case, {"phase.pressure": [1e3]}, folder=folder, quiet=True, **options)
+    with pytest.raises(ValueError, match=r"^executor = 3: must be"):
+        asperity.friction_curve("road.h5", None, speeds=[1.0], pressures=[1e5], executor=3,
+                                folder=folder)
+    assert not folder.exists()

@@ -750,3 +750,19 @@ def test_full_contact_friction_of_a_given_surface():
 def test_wrong_values_are_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_a_material_of_another_type_is_named():
+    """These calls used to end with an AttributeError of the number."""
+    k, psd = theory.self_affine_psd(0.9, 2.5e-4, 2.5e-4, 7.8e-6, rms_slope=0.02)
+    rubber = Prony(1e6, [1e7], [1e-4])
+    for call in (lambda: theory.hunter(1.0, 1.0, 1.0, 3.0),
+                 lambda: theory.lee_radok(1.0, 1.0, 3.0, [0.0]),
+                 lambda: theory.persson(k, psd, 3.0, 1e4, 1.0),
+                 lambda: theory.persson_speed_step(k, psd, 3.0, 1e4, 1.0, 2.0, [0.0]),
+                 lambda: theory.full_contact_waves(1e-6, (1e4, 0.0), (0.1, 0.0), 3.0)):
+        with pytest.raises(ValueError, match=r"^material = 3\.0: must be a Prony$"):
+            call()
+    for name, values in (("pressure", ([], 1.0)), ("velocity", (1e4, []))):
+        with pytest.raises(ValueError, match=f"^{name}: has no value, must have at least one$"):
+            theory.persson(k, psd, rubber, *values)

@@ -10,8 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["array_of", "choice", "exactly_one", "no_masked", "number", "poisson_ratio",
-           "positive", "positives", "shown", "stresses_of", "whole"]
+__all__ = ["array_of", "choice", "exactly_one", "instance", "listed", "no_masked", "number",
+           "poisson_ratio", "positive", "positives", "shown", "stresses_of", "whole"]
 
 T = TypeVar("T")
 
@@ -245,6 +245,52 @@ def choice(name: str, value: str, allowed: Sequence[str]) -> str:
     if value not in allowed:
         raise ValueError(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, allowed))}")
     return value
+
+
+def instance(name: str, value: object, kind: type[T]) -> T:
+    """Return `value` if it is an object of a class.
+
+    Raises
+    ------
+    ValueError
+        If it is not; the message names the class.
+
+    Examples
+    --------
+    >>> instance("material", 3.0, list)
+    Traceback (most recent call last):
+    ...
+    ValueError: material = 3.0: must be a list
+    """
+    if not isinstance(value, kind):
+        raise ValueError(f"{name} = {shown(value)}: must be a {kind.__name__}")
+    return value
+
+
+def listed(name: str, values: Sequence[T], *names: str) -> tuple[T, ...]:
+    """Return `values` as a tuple if it is a sequence with one value for each of some names.
+
+    Raises
+    ------
+    ValueError
+        If it is not.
+
+    Examples
+    --------
+    >>> listed("wlf", 3.0, "c1", "c2")
+    Traceback (most recent call last):
+    ...
+    ValueError: wlf = 3.0: must be (c1, c2)
+    """
+    try:
+        if isinstance(values, str | bytes):
+            raise TypeError
+        found = tuple(values)
+    except TypeError:
+        found = ()
+    if len(found) != len(names):
+        raise ValueError(f"{name} = {shown(values)}: must be ({', '.join(names)})")
+    return found
 
 
 def exactly_one(**values: T | None) -> tuple[str, T]:

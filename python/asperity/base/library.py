@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 from asperity import _core
 
-from .check import choice, no_masked, positive
+from .check import choice, no_masked, positive, whole
 from .errors import raise_for_status
 
 __all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "height_map",
@@ -134,8 +134,7 @@ def set_threads(number: int = 0) -> int:
     >>> asperity.set_threads(1)
     1
     """
-    if number < 0:
-        raise ValueError(f"number = {number}: must be 0 or more")
+    number = whole("number", number, 0)
     with _lock:
         return int(_core.flat_library.set_thread_count(number))
 

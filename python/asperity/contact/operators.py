@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import library
-from ..base.check import array_of, poisson_ratio, positive
+from ..base.check import array_of, number, poisson_ratio, positive
 from ..base.check import whole as whole_number
 from ..base.errors import NotConverged
 
@@ -93,6 +93,7 @@ class _Operator:
 
     def _solved(self, displacements: FloatArray, tolerance: float, most: int) -> FloatArray:
         """Return the tractions by conjugate gradients; the operator is symmetric and positive."""
+        most = _checked(tolerance, most)
         periodic = self.boundary == "periodic"
         mean_axes = (-2, -1)
         target = displacements
@@ -123,6 +124,12 @@ class _Operator:
         kind = "tangential" if self._components == 2 else "normal"
         return (f"{kind} operator of {self.nx} x {self.ny} cells, {self.lx:g} m x {self.ly:g} m,"
                 f" {self.boundary}, modulus {self.modulus:g} Pa")
+
+
+def _checked(tolerance: float, max_iterations: int) -> int:
+    """Check the options of an inverse, and return the largest number of iterations."""
+    number("tolerance", tolerance, 0.0, 1.0, low_open=True, high_open=True)
+    return whole_number("max_iterations", max_iterations)
 
 
 class NormalOperator(_Operator):
@@ -162,7 +169,7 @@ class NormalOperator(_Operator):
         displacement : array_like, shape (ny, nx)
             Normal displacements, m.
         tolerance : float
-            Largest residual relative to the displacements, for a free patch.
+            Largest residual relative to the displacements, for a free patch. Above 0 and below 1.
         max_iterations : int
             Largest number of iterations, for a free patch.
 
@@ -174,13 +181,15 @@ class NormalOperator(_Operator):
         Raises
         ------
         ValueError
-            If the shape is wrong, or the values are not finite real numbers.
+            If the shape is wrong, the values are not finite real numbers, or an option is not
+            allowed.
         NotConverged
             If the tolerance is not reached. Its ``result`` are the tractions found so far.
         """
         field = self._field("displacement", displacement)
         if self.boundary != "periodic":
             return self._solved(field, tolerance, max_iterations)
+        _checked(tolerance, max_iterations)
         symbol = self.symbol
         inverse = np.divide(1.0, symbol, out=np.zeros_like(symbol), where=symbol > 0.0)
         return np.fft.ifft2(inverse * np.fft.fft2(field)).real
@@ -232,7 +241,7 @@ class TangentialOperator(_Operator):
         displacement : array_like, shape (2, ny, nx)
             Tangential displacements, m.
         tolerance : float
-            Largest residual relative to the displacements.
+            Largest residual relative to the displacements. Above 0 and below 1.
         max_iterations : int
             Largest number of iterations.
 
@@ -244,7 +253,8 @@ class TangentialOperator(_Operator):
         Raises
         ------
         ValueError
-            If the shape is wrong, or the values are not finite real numbers.
+            If the shape is wrong, the values are not finite real numbers, or an option is not
+            allowed.
         NotConverged
             If the tolerance is not reached. Its ``result`` are the tractions found so far.
         """
@@ -332,4 +342,4 @@ def tangential(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus:
         If there is not enough memory.
     """
     return TangentialOperator(nx, ny, lx, ly, modulus, boundary, poisson_ratio(poisson),
-                              float(thickness))
+                              number("thickness", thickness, 0.0))

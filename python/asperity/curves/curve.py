@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.check import positive, whole
 from ..results.friction_curve import FrictionCurve
-from ..runs.means import Means, share_of_processors
+from ..runs.means import Means, means_of
 from .gathering import gather
 from .plan import CurvePlan, plan_curve
 from .running import run_pieces
@@ -140,6 +140,7 @@ def friction_curve(
         For each kind of warning of the runs, and each reason of states without a solution, with the
         points that it concerns. The variables `warned` and `converged` contain the same.
     """
+    means = means_of(jobs, threads, resume, executor, slurm)
     sources = list(roads) if isinstance(roads, list | tuple) else [roads]
     road = road_of(sources, cells=cells, side=side, join=join, short=short, outliers=outliers,
                    draw=draw, seed=seed, **options)
@@ -148,7 +149,6 @@ def friction_curve(
     plan = plan_curve(road, compound, speeds=speeds, pressures=pressures,
                       temperatures=temperatures, patches=patches, coefficient=coefficient,
                       slope_effect=slope_effect, angle=angle, tolerance=tolerance)
-    means = Means(*share_of_processors(jobs, threads), resume, executor, slurm)
     curve = run_curve(plan, folder, means, error=error, extend=extend, quiet=quiet)
     for line in curve.warnings:
         warnings.warn(line, UserWarning, stacklevel=2)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.check import choice
+from ..base.check import choice, shown
 from ..base.tables import Rows, decimals, is_number
 
 __all__ = ["FREQUENCY_UNITS", "KINDS", "MODULUS_UNITS", "ROLES", "TEMPERATURE_UNITS",
@@ -256,6 +256,9 @@ def _asked(path: Path, heads: list[str], parts: list[tuple[str, str | None]],
         choice("columns", role, ROLES)
     places: dict[str, int] = {}
     for role, wanted in given.items():
+        if not isinstance(wanted, int | str) or isinstance(wanted, bool):
+            raise ValueError(f"columns: {role} = {shown(wanted)}: must be the name of a column or"
+                             " its number, from 1")
         if isinstance(wanted, int) or wanted.isdigit():
             if int(wanted) < 1 or (heads and int(wanted) > len(heads)):
                 raise ValueError(f"columns: {role} = {wanted}: must be a number from 1"

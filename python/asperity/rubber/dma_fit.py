@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.check import number, positive
+from ..base.check import instance, number, positive, shown
 from ..base.files import SHIFTS, SHIFTS_HEAD, check_output, write_text
 from ..base.names import counted
 from ..base.presenters import present
@@ -255,6 +255,7 @@ def fit_dma(
     NotConverged
         If the fit finds no solution.
     """
+    instance("table", table, DmaTable)
     number("least_plateau", least_plateau, 0.0, 1.0)
     positive("temperature_tolerance", temperature_tolerance)
     notes = list(table.notes)
@@ -400,6 +401,8 @@ def wlf_constants(wlf: Sequence[float] | None, reference: float | None) -> WLF |
         number("reference", reference)
     if wlf is None:
         return None
+    if not isinstance(wlf, Sequence | np.ndarray) or isinstance(wlf, str):
+        raise ValueError(f"wlf = {shown(wlf)}: must be (c1, c2) or (c1, c2, t_ref)")
     if len(wlf) == 2:
         if reference is None:
             raise ValueError("wlf: has 2 numbers: give its reference temperature, too"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.check import choice, poisson_ratio
+from ..base.check import choice, poisson_ratio, shown
 from ..base.tables import Rows, cells_of, text_lines
 from .dma_columns import (
     FREQUENCY_UNITS,
@@ -127,6 +127,8 @@ def read_dma(
             choice(word, value, tuple(allowed))
     if kind is not None:
         choice("kind", kind, KINDS)
+    if columns is not None and not isinstance(columns, Mapping):
+        raise ValueError(f"columns = {shown(columns)}: must be a dict of names or numbers by role")
     lines = unfolded(cells_of(text_lines(path)), role_of)
     header, units, body = split_header(path, lines, columns or {})
     places, found_units, found_kind = find_columns(path, header, units, columns or {})

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares, minimize_scalar
 
-from ..base.check import array_of, number
+from ..base.check import array_of, number, shown
 from .wlf import WLF
 
 __all__ = ["MasterCurve", "master_curve"]
@@ -99,6 +99,8 @@ def master_curve(
     values = array_of("temperatures", temperatures, ndim=1)
     count = values.size
     for name, sweeps in (("omega", omega), ("storage", storage), ("loss", loss)):
+        if not hasattr(sweeps, "__len__"):
+            raise ValueError(f"{name} = {shown(sweeps)}: must be a list of {count} sweeps")
         if len(sweeps) != count:
             raise ValueError(f"{name}: has {len(sweeps)} sweeps, must have {count}")
     order = np.argsort(values)

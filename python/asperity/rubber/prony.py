@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.check import array_of, number, poisson_ratio
+from ..base.check import array_of, listed, number, poisson_ratio
 from ..base.presenters import present
 from .prony_fit import fit_moduli
 from .retardation import retardation_spectrum
@@ -503,7 +503,8 @@ class Prony:
         if (temperature is None) != (wlf is None):
             raise ValueError("temperature and wlf: give both or none of them")
         if temperature is not None and wlf is not None:
-            constants = WLF(*(number("wlf", value) for value in wlf))
+            constants = WLF(*(number("wlf", value)
+                              for value in listed("wlf", wlf, "c1", "c2", "t_ref")))
             constants.shift_factor(number("temperature", temperature))
             lines += [
                 f"temperature = {float(temperature)!r}",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
-from ..base.check import array_of, number, positive
+from ..base.check import array_of, listed, number, positive
 from ..base.errors import NotConverged
 
 __all__ = ["MOST_ARMS", "FittedModuli", "fit_moduli"]
@@ -95,6 +95,7 @@ def _relaxation_times(
     """Return the relaxation times, evenly spaced on a log scale."""
     if tau_range is None:
         tau_range = (0.1 / float(frequency.max()), 10.0 / float(frequency.min()))
+    listed("tau_range", tau_range, "shortest", "longest")
     shortest = positive("tau_range[0]", tau_range[0])
     longest = number("tau_range[1]", tau_range[1], shortest)
     count = max(1, round(density * math.log10(longest / shortest)) + 1)

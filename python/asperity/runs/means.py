@@ -13,12 +13,12 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import NamedTuple
 
-from ..base.check import whole
+from ..base.check import shown, whole
 from .jobs import Job, Stops, found_result, run_here, write_input
 from .program import program
 from .progress import Progress
 
-__all__ = ["Means", "run_file", "run_jobs", "share_of_processors", "submit"]
+__all__ = ["Means", "means_of", "run_file", "run_jobs", "share_of_processors", "submit"]
 
 _POLL = 0.2             # time between two checks of an executor, s
 _QUEUE = "slurm.json"   # record of the job that was submitted from a folder
@@ -74,6 +74,21 @@ def share_of_processors(jobs: int | None, threads: int) -> tuple[int, int]:
     if threads > cores:
         raise ValueError(f"threads = {threads}: must be at most the {cores} processors")
     return min(jobs or cores, max(1, cores // threads)), threads
+
+
+def means_of(jobs: int | None, threads: int, resume: bool, executor: Executor | None,
+             slurm: str | None) -> Means:
+    """Return the way in which jobs are run, from the arguments of a call.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive, there are fewer processors than `threads`, or the executor is
+        none.
+    """
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise ValueError(f"executor = {shown(executor)}: must be a concurrent.futures.Executor")
+    return Means(*share_of_processors(jobs, threads), resume, executor, slurm)
 
 
 def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means) -> None:

@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from ..base.check import choice
+from ..base.check import choice, shown
 from ..base.files import make_folder
 from ..results import Run, open_result
 from ..results.steady import steady_mean
 from . import namelists
 from .case import Case
 from .jobs import Job, is_done
-from .means import Means, run_jobs, share_of_processors
+from .means import means_of, run_jobs
 from .progress import Progress
 from .sweep_table import Failure, Sweep, SweepError, column
 
@@ -135,7 +135,9 @@ def sweep(
     choice("errors", errors, ("raise", "keep"))
     if isinstance(measure, str):
         choice("measure", measure, ("steady",))
-    side_by_side, threads = share_of_processors(jobs, threads)
+    elif measure is not None and not callable(measure):
+        raise ValueError(f"measure = {shown(measure)}: must be a function of a run, or 'steady'")
+    means = means_of(jobs, threads, resume, executor, slurm)
     case = base.copy() if isinstance(base, Case) else Case.read(base)
     points, shape = _points(parameters, zip)
     for names in parameters:
@@ -153,12 +155,11 @@ def sweep(
             job.status = 0
         else:
             waiting.append(job)
-    run_jobs(waiting, folder, Progress("sweep", len(work), len(waiting), quiet), Means(
-        side_by_side, threads, resume, executor, slurm))
+    run_jobs(waiting, folder, Progress("sweep", len(work), len(waiting), quiet), means)
     table = _table(work, shape, measure)
     if table.failed and errors == "raise" and slurm is None:
-        shown = "\n".join(f"  {failure}" for failure in table.failed)
-        raise SweepError(f"{len(table.failed)} of {len(work)} cases failed:\n{shown}", table)
+        lines = "\n".join(f"  {failure}" for failure in table.failed)
+        raise SweepError(f"{len(table.failed)} of {len(work)} cases failed:\n{lines}", table)
     return table
 
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from ..base.check import array_of, exactly_one, number, poisson_ratio, positive
+from ..base.check import array_of, exactly_one, instance, number, poisson_ratio, positive
 from ..roads import surface
 from ..rubber.material import Prony
 
@@ -503,8 +503,12 @@ def persson(
     np.True_
     """
     s = _spectrum(wavenumber, psd)
+    instance("material", material, Prony)
     p = array_of("pressure", pressure, low=0.0, low_open=True)
     v = array_of("velocity", velocity, low=0.0)
+    for name, values in (("pressure", p), ("velocity", v)):
+        if not values.size:
+            raise ValueError(f"{name}: has no value, must have at least one")
     p, v = np.broadcast_arrays(p, v)
     nu = poisson_ratio(poisson)
     weight = number("gamma", gamma, 0.0, 1.0)
@@ -574,6 +578,7 @@ def persson_speed_step(
     True
     """
     s = _spectrum(wavenumber, psd)
+    instance("material", material, Prony)
     p = positive("pressure", pressure)
     before = number("velocity_before", velocity_before, 0.0)
     after = number("velocity_after", velocity_after, 0.0)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import ive, kve
 
-from ..base.check import array_of, number, poisson_ratio, positive, positives
+from ..base.check import array_of, instance, number, poisson_ratio, positive, positives
 from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
@@ -192,6 +192,7 @@ def lee_radok(
     load, knots = _force_history(force, t)
     if not callable(force) and np.ndim(force) == 1 and t[0] != 0.0:
         raise ValueError(f"times[0] = {float(t[0])!r}: must be 0 where force is an array")
+    instance("material", material, Prony)
     theta, compliance = material.retardation_times, material.retardation_compliances
     glassy, fluidity = 1.0 / material.instantaneous_modulus, material.fluidity
 
@@ -428,7 +429,7 @@ def hunter(
     """
     r, w, v = positives(radius=radius, load=load, velocity=velocity)
     nu = poisson_ratio(poisson)
-    arms = material.g > 0.0
+    arms = instance("material", material, Prony).g > 0.0
     if int(arms.sum()) != 1:
         raise ValueError(f"material: has {int(arms.sum())} arms with g > 0, must have one")
     relaxed = positive("material g_inf", material.g_inf)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.check import array_of, choice, number, poisson_ratio, positives
+from ..base.check import array_of, choice, instance, number, poisson_ratio, positives
 from ..rubber.material import Prony
 
 FloatArray = NDArray[np.float64]
@@ -288,6 +288,7 @@ def full_contact_waves(
         raise ValueError(f"wavevector: has shape {q.shape}, must have (n, 2)")
     if v.shape != (2,):
         raise ValueError(f"velocity: has shape {v.shape}, must have (2,)")
+    instance("material", material, Prony)
     n = q.shape[0]
     shift = array_of("phase", phase)
     for name, values in (("amplitude", d), ("phase", shift)):
