@@ -133,6 +133,12 @@ contains
       call reader%open(path, 'heights', [4, 2], error)
       call check_error(error, 'there is no dataset "heights"; there are: line, surface', 'missing')
       call check_that(error%status == error_file, 'status of a missing dataset')
+      call file%open(path, 'append', error)
+      call file%create_group('/maps/height', error)
+      call file%close(error)
+      call reader%open(path, 'maps/height', [4, 2], error)
+      call check_error(error, '"maps/height" is a group, not a dataset; there are: line, maps/height/, surface', &
+         'a group')
       call reader%open(path, 'line', [4, 2], error)
       call check_error(error, 'has 1 dimensions, not 2', 'shape')
       call check_that(error%status == error_input, 'status of a wrong shape')

@@ -454,7 +454,8 @@ contains
       call check_that(error%status == error_input, 'a wrong shape is wrong input')
       term%dataset = 'holes'
       call new_height(grid, [term], h, error)
-      call check_error(error, 'a value that is not finite', 'NaN in a map')
+      call check_error(error, 'a value that is not finite (NaN or infinite) at [2, 1] (row, column; from 0)', &
+         'NaN in a map')
       call check_that(error%status == error_input, 'NaN is wrong input')
       term%dataset = 'nothing'
       call new_height(grid, [term], h, error)

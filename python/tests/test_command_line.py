@@ -290,6 +290,21 @@ def test_a_height_map_in_another_unit_causes_warnings(program, tmp_path, dataset
     assert "warning" not in done.out
 
 
+def test_values_of_a_map_that_are_not_finite_are_reported_with_their_place(program, tmp_path):
+    text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
+    height = np.zeros((8, 16))
+    for count, words in ((1, "a value that is not finite (NaN or infinite) at [5, 3]"),
+                         (2, "2 values that are not finite (NaN or infinite), the first at [4, 9]")):
+        height[[5, 4][:count], [3, 9][:count]] = np.nan
+        with h5py.File(tmp_path / "map.h5", "w") as file:
+            file["surface/height"] = height
+        assert f"{words} (row, column; from 0): all must be" in check(program, tmp_path, text).err
+    with h5py.File(tmp_path / "map.h5", "w") as file:
+        file.create_group("surface/height")
+    assert ('"surface/height" is a group, not a dataset; there are: surface/height/'
+            in check(program, tmp_path, text).err)
+
+
 def test_a_missing_height_map_is_reported_with_its_place(program, tmp_path):
     """The message names input, group, variable and line, and reports several maps at once."""
     text = GOOD.replace("shape = 'sphere', radius = 0.01 /",

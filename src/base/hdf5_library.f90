@@ -25,6 +25,7 @@ module hdf5_library
    integer, parameter, public :: h5f_close_strong = 3
    integer, parameter, public :: h5f_libver_v18 = 1
    integer, parameter, public :: h5f_scope_local = 0
+   integer, parameter, public :: h5i_group = 2
    integer, parameter, public :: h5i_dataset = 5
    integer, parameter, public :: h5o_copy_without_attr = 16
    integer, parameter, public :: h5d_fill_time_never = 1

@@ -42,7 +42,10 @@ contains
 
       allocate (extent(0))
       if (self%has_failed(error)) return
-      if (.not. self%has_dataset(path)) then
+      if (self%has_group(path)) then
+         call fail(fault, error_file, self%path//': "'//trim(path)// &
+            '" is a group, not a dataset; there are: '//self%listing())
+      else if (.not. self%has_dataset(path)) then
          call fail(fault, error_file, self%path//': there is no dataset "'//trim(path)// &
             '"; there are: '//self%listing())
       else

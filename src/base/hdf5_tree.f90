@@ -16,7 +16,7 @@ module hdf5_tree
       h5lcreate_external, h5ldelete, h5lexists, h5oclose, h5olink, h5oopen
    use hdf5_kinds, only : hid_t
    use hdf5_handle, only : hdf5_handle_type, set_one_block
-   use hdf5_library, only : c_text, h5i_dataset, h5p_default, h5p_group_create, h5p_link_create, &
+   use hdf5_library, only : c_text, h5i_dataset, h5i_group, h5p_default, h5p_group_create, h5p_link_create, &
       member_count, member_name, status_of
    implicit none
    private
@@ -34,6 +34,7 @@ module hdf5_tree
       procedure :: publish_group
       procedure :: has
       procedure :: has_dataset
+      procedure :: has_group
       procedure :: has_link
       procedure :: members
       procedure :: listing
@@ -181,9 +182,26 @@ contains
    end function has_link
 
    !> Is there a dataset of this name?
-   function has_dataset(self, path) result(exists)
+   logical function has_dataset(self, path)
       class(hdf5_tree_type), intent(in) :: self
       character(*), intent(in) :: path
+
+      has_dataset = has_kind(self, path, h5i_dataset)
+   end function has_dataset
+
+   !> Is there a group of this name?
+   logical function has_group(self, path)
+      class(hdf5_tree_type), intent(in) :: self
+      character(*), intent(in) :: path
+
+      has_group = has_kind(self, path, h5i_group)
+   end function has_group
+
+   !> Is there an object of this name and kind? A link to nothing is none.
+   function has_kind(self, path, kind) result(exists)
+      class(hdf5_tree_type), intent(in) :: self
+      character(*), intent(in) :: path
+      integer, intent(in) :: kind           !! of HDF5
       logical :: exists
       character(:), allocatable :: name
       integer(hid_t) :: location, object
@@ -195,9 +213,9 @@ contains
       object = h5oopen(location, c_text(name), h5p_default)
       exists = object >= 0
       if (.not. exists) return
-      exists = h5iget_type(object) == h5i_dataset
+      exists = h5iget_type(object) == kind
       ignored = h5oclose(object)
-   end function has_dataset
+   end function has_kind
 
    !> The names in a group, in alphabetical order; none after a fault.
    subroutine members(self, path, names, error)
@@ -228,7 +246,7 @@ contains
       call self%settle(fault, error)
    end subroutine members
 
-   !> The datasets of a file as a text for messages, down to the second level.
+   !> The datasets of a file as a text for messages, down to the second level. Groups there end with a slash.
    function listing(self) result(text)
       class(hdf5_tree_type), intent(inout) :: self
       character(:), allocatable :: text
@@ -245,7 +263,8 @@ contains
          else if (self%has('/'//trim(top(i)))) then
             call self%members('/'//trim(top(i)), inner, error)
             do j = 1, size(inner)
-               call add(trim(top(i))//'/'//trim(inner(j)))
+               call add(trim(top(i))//'/'//trim(inner(j))// &
+                  merge('/', ' ', self%has_group('/'//trim(top(i))//'/'//trim(inner(j)))))
             end do
          end if
       end do
@@ -261,9 +280,9 @@ contains
          if (count > 20) then
             if (count == 21) text = text//', ...'
          else if (text == '') then
-            text = name
+            text = trim(name)
          else
-            text = text//', '//name
+            text = text//', '//trim(name)
          end if
       end subroutine add
 

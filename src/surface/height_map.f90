@@ -27,6 +27,7 @@ module height_map
       type(field_reader_type) :: field
       real(dp) :: scale = 1.0_dp
       integer(int64) :: faulty = 0                       !! values so far that are not finite
+      integer :: place(2) = 0                            !! i, j of the first of them, from 1
       integer(int64), allocatable :: rows(:)             !! checksums of the rows so far
       type(error_type), allocatable :: error             !! the first error
    contains
@@ -146,9 +147,28 @@ contains
       do j = 1, size(values, 2)
          faulty = faulty + count(.not. ieee_is_finite(self%scale*values(:, j)))
       end do
+      if (self%faulty == 0 .and. faulty > 0) self%place = first_faulty(self%scale, first, values)
       self%faulty = self%faulty + faulty
       self%rows(first:first + size(values, 2) - 1) = checksums_of_rows(values)
    end subroutine read_rows
+
+   !> Place i, j of the first value that is not finite.
+   pure function first_faulty(scale, first, values) result(place)
+      real(dp), intent(in) :: scale
+      integer, intent(in) :: first                       !! row of the first values, from 1
+      real(dp), intent(in) :: values(:, :)               !! [nx, rows], not scaled
+      integer :: place(2)
+      integer :: i, j
+
+      place = 0
+      do j = 1, size(values, 2)
+         do i = 1, size(values, 1)
+            if (ieee_is_finite(scale*values(i, j))) cycle
+            place = [i, first + j - 1]
+            return
+         end do
+      end do
+   end function first_faulty
 
    !> Read all rows, to compute their checksums and to count the values that are not finite.
    subroutine read_all(self)
@@ -172,7 +192,7 @@ contains
       type(surface_settings_type), intent(in) :: term
       integer(int64), intent(out) :: checksum            !! of the map
       type(error_type), allocatable, intent(out) :: error
-      character(160) :: text
+      character(160) :: text, place
 
       checksum = checksum_of_checksums(self%field%extent(1), self%rows)
       call self%field%close()
@@ -183,7 +203,11 @@ contains
          text = 'the height map has a value that is not finite'
          if (self%faulty > 1) write (text, '(a, i0, a)') 'the height map has ', self%faulty, &
             ' values that are not finite'
-         call fail(error, error_input, map_fault(term, trim(text)//' (NaN or infinite): all must be numbers, in m'))
+         write (place, '(a, 2(i0, a))') ' at [', self%place(2) - 1, ', ', self%place(1) - 1, &
+            '] (row, column; from 0)'
+         if (self%faulty > 1) place = ', the first'//place
+         call fail(error, error_input, map_fault(term, trim(text)//' (NaN or infinite)'//trim(place)// &
+            ': all must be numbers, in m'))
       end if
    end subroutine finish
 
