@@ -43,6 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(arguments: list[str]) -> int:
     """Run the command. Modules are imported here, because Ctrl-C may come while NumPy is loaded."""
     from .base.library import version
+    from .base.pipes import patient_output
     from .commands.data import add_fit, add_import
     from .commands.friction import add_friction
     from .commands.results import add_plot, add_report, add_watch
@@ -57,7 +58,10 @@ def _run(arguments: list[str]) -> int:
     for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):
         add(verbs)
     chosen = parser.parse_args(with_negative_lists(arguments))
-    return chosen.call(chosen)
+    if chosen.verb == "watch":  # which ends when nobody reads it
+        return chosen.call(chosen)
+    with patient_output():
+        return chosen.call(chosen)
 
 
 def with_negative_lists(arguments: list[str]) -> list[str]:

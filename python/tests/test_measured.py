@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import re
 import struct
 import subprocess
@@ -672,6 +673,25 @@ def test_from_the_instrument_s_file_to_a_run(tmp_path, program):
     assert shown["nx, ny"] == "20, 12"
     assert float(shown["rms slope"]) == pytest.approx(slope, rel=1e-5)
     assert float(shown["rms height"].split()[0]) == pytest.approx(road.std(), rel=1e-5)
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_pipe_that_nobody_reads_does_not_matter(tmp_path, unbuffered):
+    """As with `| head -1`: the files are written, and there is no message."""
+    np.save(tmp_path / "map.npy", sample())
+    (tmp_path / "dma.csv").write_text("f (Hz),G' (Pa),G'' (Pa)\n" + "".join(
+        f"{10.0**k},{2e6 * 1.5**k},{1e5 + 1e5 * k}\n" for k in range(6)))
+    for words, name in (
+            (("import", "map.npy", "--unit", "um", "--size", 46, 21, "-o", "s.h5"), "s.h5"),
+            (("fit", "dma.csv", "-o", "fit.nml", "--plot", "fit.png"), "fit.png")):
+        reading, writing = os.pipe()
+        os.close(reading)
+        done = subprocess.run([sys.executable, "-m", "asperity", *map(str, words)], cwd=tmp_path,
+                              stdout=writing, stderr=subprocess.PIPE, text=True, check=False,
+                              env=dict(os.environ, PYTHONUNBUFFERED=unbuffered))
+        os.close(writing)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert (tmp_path / name).stat().st_size
 
 
 def test_every_option_of_the_command_takes_effect(tmp_path, monkeypatch):
