@@ -293,8 +293,9 @@ def test_a_height_map_in_another_unit_causes_warnings(program, tmp_path, dataset
 def test_values_of_a_map_that_are_not_finite_are_reported_with_their_place(program, tmp_path):
     text = GOOD.replace("shape = 'sphere', radius = 0.01", "shape = 'file', file = 'map.h5'")
     height = np.zeros((8, 16))
-    for count, words in ((1, "a value that is not finite (NaN or infinite) at [5, 3]"),
-                         (2, "2 values that are not finite (NaN or infinite), the first at [4, 9]")):
+    for count, words in (
+            (1, "a value that is not finite (NaN or infinite) at [5, 3]"),
+            (2, "2 values that are not finite (NaN or infinite), the first at [4, 9]")):
         height[[5, 4][:count], [3, 9][:count]] = np.nan
         with h5py.File(tmp_path / "map.h5", "w") as file:
             file["surface/height"] = height

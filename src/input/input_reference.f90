@@ -130,8 +130,9 @@ contains
             'Dataset in that file; by default ''surface/height'' or else ''surface''.'), &
          row('surface', 'scale', kind_real, '1.0', '', 'any', 'Factor by which the heights of the file are multiplied.'), &
          row('surface', 'centre_x', kind_real, '((nx/2) lx/nx)', 'm', 'any', &
-            'Position of the summit along x; the default is the centre of a cell.'), &
-         row('surface', 'centre_y', kind_real, '((ny/2) ly/ny)', 'm', 'any', 'Position of the summit along y.')]
+            'Position of the summit along x, or for ''hexagonal_wave'' of a point of height zero; '// &
+            'the default is the centre of a cell.'), &
+         row('surface', 'centre_y', kind_real, '((ny/2) ly/ny)', 'm', 'any', 'The same along y.')]
    end function surface
 
    !> What each word of `shape` means.

@@ -38,7 +38,7 @@ def add_import(verbs: Any) -> None:
     parser.add_argument("--channel", metavar="NAME|N",
                         help="channel by its name, or its number from 0; default: the heights")
     parser.add_argument("--unit", metavar="UNIT",
-                        help="unit of length (m, mm, um, nm, pm, A, inch) if the file has none")
+                        help="unit of length (m, mm, um, nm, pm, A, km, inch) if the file has none")
     parser.add_argument("--size", nargs="+", type=float, metavar=("LX", "LY"),
                         help="lengths if the file has none; only LX for a line scan")
     parser.add_argument("--transpose", action="store_true",

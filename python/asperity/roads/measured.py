@@ -190,7 +190,8 @@ def load(
         Id of the channel (see `channels`) or its number from 0. The default is the default channel
         of the file or, if that has no heights, the first channel with heights.
     unit : str, optional
-        Unit of lengths, 'm', 'mm', 'um', 'nm', 'pm', 'A' or 'inch'. Only for files that name none.
+        Unit of lengths, 'm', 'mm', 'um', 'nm', 'pm', 'A', 'km' or 'inch'. Only for files that name
+        none.
     size : (float, float) or float, optional
         Lengths along x and y in the file's unit, one number for a line scan. Only for files that
         give none.
