@@ -10,10 +10,11 @@ module flat_roads
    use regular_grid, only : grid_type
    use roughness, only : height_psd, height_statistics, radial_psd, roughness_type
    use surface_settings, only : default_surface, surface_settings_type
+   use surface_warnings, only : find_warnings, warning_length
    implicit none
    private
 
-   public :: map_checksum, surface_height, surface_psd, surface_radial_psd, surface_statistics
+   public :: map_checksum, surface_doubts, surface_height, surface_psd, surface_radial_psd, surface_statistics
 
 contains
 
@@ -72,6 +73,33 @@ contains
       end if
       call report(error, status, message)
    end subroutine surface_height
+
+   !> The warnings of a run about the wavelengths of a self-affine surface, one per line.
+   subroutine surface_doubts(nx, ny, lx, ly, wavelength_long, wavelength_short, warnings, status, message)
+      integer(c_int), intent(in) :: nx, ny
+      real(c_double), intent(in) :: lx, ly
+      real(c_double), intent(in) :: wavelength_long, wavelength_short
+      character(len=1000), intent(out) :: warnings
+      integer(c_int), intent(out) :: status
+      character(len=2000), intent(out) :: message
+      type(error_type), allocatable :: error
+      type(grid_type) :: grid
+      type(surface_settings_type) :: term(1)
+      character(warning_length), allocatable :: found(:)
+      integer :: i
+
+      grid = grid_of(nx, ny, lx, ly, 0_c_int)
+      term(1) = default_surface(grid)
+      term(1)%shape = 'self_affine'
+      term(1)%wavelength_long = wavelength_long
+      term(1)%wavelength_short = wavelength_short
+      call find_warnings(grid, term, found)
+      warnings = ''
+      do i = 1, size(found)
+         warnings = trim(warnings)//new_line('a')//found(i)
+      end do
+      call report(error, status, message)
+   end subroutine surface_doubts
 
    !> Power spectral density of all modes, in the order of an FFT.
    subroutine surface_psd(height, nx, ny, lx, ly, psd, status, message)

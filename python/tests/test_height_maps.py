@@ -1,5 +1,7 @@
 """Generated height maps and statistics of maps, computed by the Fortran library."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -102,6 +104,24 @@ def test_wrong_values(changes, message):
     with pytest.raises(ValueError, match=message) as caught:
         asperity.surface.self_affine(**(arguments | changes))
     assert "&" not in str(caught.value)  # it names arguments, not groups
+
+
+def test_doubtful_wavelengths_are_warned_of_as_by_the_program():
+    """`check` warns of the same, in the same words."""
+    given = dict(hurst=0.8, wavelength_long=3.0, wavelength_short=0.1)
+    with pytest.warns(UserWarning) as caught:
+        asperity.surface.self_affine(16, **given, rms_slope=0.1)
+    lines = [str(one.message) for one in caught]
+    assert "wavelength_long = 3.000E+00 m is not below the side of 1.000E+00 m" in lines[0]
+    assert "the shortest wave is not above the Nyquist wavelength of 1.250E-01 m" in lines[1]
+    case = asperity.Case(grid=dict(nx=16, ny=16, lx=1.0), material=dict(shear_modulus=1e6),
+                         surface=dict(shape="self_affine", **given, rms_slope=0.1),
+                         phase=dict(pressure=1e3))
+    text = str(case.check())
+    assert all(f"! warning: &surface: {line}" in text for line in lines)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        asperity.surface.self_affine(32, wavelength_short=0.25, rms_slope=0.1)
 
 
 def test_wrong_shapes():

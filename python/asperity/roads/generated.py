@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,7 @@ _SHAPES = {"sphere": ("radius",), "paraboloid": ("radius",), "cylinder": ("radiu
            "sine": ("amplitude", "wavelength"), "hexagonal_wave": ("amplitude", "wavelength")}
 
 _height = library.call("surface_height")
+_doubts = library.call("surface_doubts")
 
 
 def self_affine(
@@ -73,6 +76,12 @@ def self_affine(
     ValueError
         If a value is not allowed, or the grid has no mode in the band of wavelengths.
 
+    Warns
+    -----
+    UserWarning
+        If the grid does not resolve the shortest waves, or the longest are not below its side. Of
+        the latter a call is warned only if it gives `wavelength_long`.
+
     Examples
     --------
     >>> import asperity
@@ -98,13 +107,27 @@ def self_affine(
                          f" {most}")
     number("hurst", hurst, 0.0, 1.0, low_open=True)
     choice("generator", generator, ("random_phase", "filtered_noise"))
-    return _make(
+    height = _make(
         nx, nx if ny is None else ny, lx, ly, "periodic", "self_affine", hurst=hurst,
         wavelength_long=longest, wavelength_rolloff=longest if rolloff is None else rolloff,
         wavelength_short=wavelength_short,
         rms_height=0.0 if rms_height is None else positive("rms_height", rms_height),
         rms_slope=0.0 if rms_slope is None else positive("rms_slope", rms_slope),
         seed=seed, generator=generator)
+    _warn(height.shape, lx, ly, wavelength_long, shortest)
+    return height
+
+
+def _warn(shape: tuple[int, ...], lx: float, ly: float | None, longest: float | None,
+          shortest: float) -> None:
+    """Warn of wavelengths that the grid does not hold, in the words of the program."""
+    ny, nx = shape
+    lx, ly = library.lengths((ny, nx), lx, ly)
+    # The default is the side, which is allowed for a map of which nothing is known.
+    (found,) = _doubts(nx, ny, lx, ly, min(lx, ly) / 4.0 if longest is None else longest, shortest)
+    for line in found.decode().split("\n"):
+        if line.strip():
+            warnings.warn(line.strip().removeprefix("&surface: "), UserWarning, stacklevel=3)
 
 
 def shape(
@@ -135,7 +158,8 @@ def shape(
     radius, amplitude, wavelength : float
         Lengths, m. Those that the shape needs have no default.
     centre_x, centre_y : float, optional
-        Position of the summit, m; by default the centre of the middle cell.
+        Position of the summit, or for 'hexagonal_wave' of a point of height zero, m; by default
+        the centre of the middle cell.
     boundary : str
         'periodic' or 'free'.
 
