@@ -11,7 +11,7 @@ from ..base.check import choice, shown
 from ..base.tables import Rows, decimals, is_number
 
 __all__ = ["FREQUENCY_UNITS", "KINDS", "MODULUS_UNITS", "ROLES", "TEMPERATURE_UNITS",
-           "find_columns", "role_of", "split_header"]
+           "asked_columns", "find_columns", "role_of", "split_header"]
 
 FREQUENCY_UNITS = {"Hz": 2.0 * math.pi, "kHz": 2e3 * math.pi, "mHz": 2e-3 * math.pi,
                    "rad/s": 1.0, "krad/s": 1e3}
@@ -174,6 +174,13 @@ def role_of(head: str) -> str | None:
     """
     name = _name_and_unit(head)[0]
     return next((role for role, names in _NAMES.items() if name in names), None)
+
+
+def asked_columns(columns: Mapping[str, str | int] | None) -> Mapping[str, str | int]:
+    """Return the requested columns by role, or raise ValueError if they are no mapping."""
+    if columns is not None and not isinstance(columns, Mapping):
+        raise ValueError(f"columns = {shown(columns)}: must be a dict of names or numbers by role")
+    return columns or {}
 
 
 def find_columns(

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.check import choice, poisson_ratio, shown
+from ..base.check import choice, poisson_ratio
 from ..base.tables import Rows, cells_of, text_lines
 from .dma_columns import (
     FREQUENCY_UNITS,
     KINDS,
     MODULUS_UNITS,
     TEMPERATURE_UNITS,
+    asked_columns,
     find_columns,
     role_of,
     split_header,
@@ -127,11 +128,10 @@ def read_dma(
             choice(word, value, tuple(allowed))
     if kind is not None:
         choice("kind", kind, KINDS)
-    if columns is not None and not isinstance(columns, Mapping):
-        raise ValueError(f"columns = {shown(columns)}: must be a dict of names or numbers by role")
+    asked = asked_columns(columns)
     lines = unfolded(cells_of(text_lines(path)), role_of)
-    header, units, body = split_header(path, lines, columns or {})
-    places, found_units, found_kind = find_columns(path, header, units, columns or {})
+    header, units, body = split_header(path, lines, asked)
+    places, found_units, found_kind = find_columns(path, header, units, asked)
     body, notes = _measured(body, places)
 
     def unit(role: str, given: str | None, allowed: Mapping[str, float], default: str) -> float:
