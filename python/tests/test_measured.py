@@ -178,7 +178,8 @@ def test_points_on_a_grid_with_holes(tmp_path):
         load(tmp_path / "points.xyz", unit="um")
 
 
-MARKS = ["***", "---", "--", "#N/A", "1.#QNAN", "-1.#IND", "NULL", "-nan(ind)", "#DIV/0!"]
+MARKS = ["***", "---", "--", "#N/A", "1.#QNAN", "-1.#IND", "NULL", "-nan(ind)", "#DIV/0!",
+         "OVL"]
 
 
 @pytest.mark.parametrize("separator", [" ", "\t", ";"])

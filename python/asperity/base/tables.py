@@ -21,8 +21,8 @@ _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 #: Errors of a spreadsheet in English and German; the sign # does not make a line of them a comment.
 _ERRORS = re.compile(r"#(?:n/?a|nv|null!|num!|zahl!|div/0!|value!|wert!|ref!|bezug!)", re.I)
 #: Marks of missing values by instruments, spreadsheets and programs.
-_MISSING = re.compile(r"-+|\*+|x|bad|n/?a|null|none|undefined|infinite|[-+]?inf"
-                      r"|[-+]?nan(?:\(\w*\))?|[-+]?\d\.#\w+", re.I)
+_MISSING = re.compile(r"-+|\*+|x|bad|n/?a|n\.a\.|null|none|invalid|undefined|infinite|[-+]?inf"
+                      r"|ovld?|overflow|overload|[-+]?nan(?:\(\w*\))?|[-+]?\d\.#\w+", re.I)
 
 
 def text_lines(path: Path) -> list[tuple[int, str]]:
