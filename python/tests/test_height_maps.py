@@ -121,7 +121,9 @@ def test_doubtful_wavelengths_are_warned_of_as_by_the_program():
     assert all(f"! warning: &surface: {line}" in text for line in lines)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        asperity.surface.self_affine(32, wavelength_short=0.25, rms_slope=0.1)
+        asperity.surface.self_affine(32, wavelength_short=0.1, rms_slope=0.1)
+        asperity.surface.self_affine(32, 16, wavelength_short=0.1, wavelength_long=1.0,
+                                     rms_slope=0.1)
 
 
 def test_wrong_shapes():

@@ -79,8 +79,7 @@ def self_affine(
     Warns
     -----
     UserWarning
-        If the grid does not resolve the shortest waves, or the longest are not below its side. Of
-        the latter a call is warned only if it gives `wavelength_long`.
+        If the grid cannot represent the shortest waves, or the longest are longer than its sides.
 
     Examples
     --------
@@ -123,10 +122,12 @@ def _warn(shape: tuple[int, ...], lx: float, ly: float | None, longest: float | 
     """Warn of wavelengths that the grid does not hold, in the words of the program."""
     ny, nx = shape
     lx, ly = library.lengths((ny, nx), lx, ly)
-    # The default is the side, which is allowed for a map of which nothing is known.
-    (found,) = _doubts(nx, ny, lx, ly, min(lx, ly) / 4.0 if longest is None else longest, shortest)
+    # The program also warns of waves of a few cells, and of waves as long as a side. Both are often
+    # wanted in a map that is generated on purpose, and the second is the default here.
+    beyond = longest is not None and longest > (lx if ny == 1 else max(lx, ly)) * (1.0 + 1e-9)
+    (found,) = _doubts(nx, ny, lx, ly, longest if beyond else min(lx, ly) / 4.0, shortest)
     for line in found.decode().split("\n"):
-        if line.strip():
+        if "Nyquist" in line or "wavelength_long" in line:
             warnings.warn(line.strip().removeprefix("&surface: "), UserWarning, stacklevel=3)
 
 
