@@ -375,6 +375,8 @@ contains
       call refuse(body//'&case title = '''//repeat('x', 300)//''' /', 'must have at most 256 characters')
       call refuse(body//'&output file = '''//repeat('x', 3000)//''' /', 'of at most 1024 characters')
       call refuse(body//'&output snapshot_fields = ''slip_x'' /', 'need &friction')
+      call refuse(body//'&output snapshot_fields = ''gap'', ''pressure'', ''gap'' /', 'must name each field once')
+      call refuse(body//'&output snapshot_times = /', 'has no value: every value must be')
       call refuse(body//'&output snapshot_times = 1.0 /', 'must be within the run, which ends at 0 s')
       call refuse(body//'&output snapshot_times = 1.0, snapshot_every = 2 /', 'are given together')
 

@@ -198,6 +198,14 @@ contains
          call run_problem(grid, problem, h, s, thesis)
          call check_no_pressure(s, 'an overlap that is round-off')
       end do
+      ! Many equal summits, on which small pressures would be within the tolerance.
+      grid = new_grid(8, 8, 1e-3_dp, 1e-3_dp, boundary_periodic)
+      h = spread(2e-6_dp*[(cos(0.5_dp*pi*k), k=0, 7)], 2, 8)
+      problem%tolerance = 1e-6_dp
+      problem%rms_height = 0.0_dp
+      problem%target = -maxval(h)
+      call run_problem(grid, problem, h, s, thesis)
+      call check_no_pressure(s, 'first touch of equal summits')
    end subroutine approach_that_does_not_reach
 
    !> An approach that would leave no gap cannot be solved on a periodic grid. The solver says so.

@@ -36,7 +36,27 @@ contains
       if (selected('sphere_crosses_a_free_map')) call sphere_crosses_a_free_map()
       if (selected('contact_at_the_edge_is_reported')) call contact_at_the_edge_is_reported()
       if (selected('contacts_of_few_cells')) call contacts_of_few_cells()
+      if (selected('road_slides_at_its_speed_without_friction')) call road_slides_at_its_speed_without_friction()
    end subroutine run_simulation_sliding
+
+   !> Without friction the surface does not move along the road: the sliding speed is that of the road in every row, and 0
+   !> at rest and in jumps.
+   subroutine road_slides_at_its_speed_without_friction()
+      real(dp), parameter :: expected(0:7) = [1.0_dp, 0.5_dp, 0.5_dp, 0.0_dp, 0.0_dp, 0.0_dp, 2.0_dp, 0.0_dp]
+      type(record_type) :: record
+      integer :: k
+
+      call run_case('&grid nx = 16, ny = 16, lx = 1e-3 /'//nl// &
+         '&surface shape = ''sine'', amplitude = 1e-6, wavelength = 1e-3 /'//nl// &
+         '&material shear_modulus = 1e6, prony_g = 2e6, prony_tau = 1e-4 /'//nl// &
+         '&phase pressure = 1e4, steady = .true., velocity_x = 1 /'//nl// &
+         '&phase velocity_x = 0.3, velocity_y = -0.4, duration = 1e-3, steps = 2 /'//nl// &
+         '&phase duration = 1e-3, steps = 2 /'//nl//'&phase relaxed = .true. /'//nl// &
+         '&phase velocity_y = 2, duration = 1e-4, steps = 1 /'//nl//'&phase pressure = 2e4 /', 'speed of the road', record)
+      do k = 0, 7
+         call check_close(record%rows(k)%sliding_speed, expected(k), 1e-12_dp, 'speed of the road in row '//to_text(k))
+      end do
+   end subroutine road_slides_at_its_speed_without_friction
 
    !> Return the friction of Hunter's cylinder, with one cell per step and 100 cells over the contact. The cell of `cells`
    !> cells is periodic: its images deform the rubber like a road of another curvature, by a factor of about (pi a/L)^2/6,

@@ -50,6 +50,9 @@ contains
       call check_order(index(text, '</Xdmf>'), '>', 0, 'the file is complete')
       call write_xdmf(path, 'a.h5', grid, snapshots(:1), error)
       call check_that(count_of(content(), '<Time') == 1, 'the file is written again')
+      snapshots(2)%time = 0.0_dp
+      call write_xdmf(path, 'a.h5', grid, snapshots, error)
+      call check_that(count_of(content(), '" 1.2000000000000000E+01"/>') == 1, 'rows in place of times that repeat')
       call write_xdmf('no_such_folder/x.xdmf', 'a.h5', grid, snapshots, error)
       call check_error(error, 'no_such_folder/x.xdmf: cannot be written', 'missing folder')
       call remove_file(path)

@@ -351,6 +351,11 @@ contains
          allocate (fields, source=group%texts_value('snapshot_fields'))
          allocate (output%snapshot_fields(size(fields)))
          output%snapshot_fields = fields(:)(:word_length)
+         do i = 2, size(fields)
+            if (all(fields(:i - 1) /= fields(i))) cycle
+            call group%fault('snapshot_fields', 'must name each field once', faults)
+            exit
+         end do
          if (case%friction%law == 'none' .and. any(field_needs_friction(output%snapshot_fields))) &
             call group%fault('snapshot_fields', 'traction, slip and displacement_x, displacement_y need '// &
             '&friction', faults)

@@ -188,7 +188,7 @@ contains
       end do
 
       if (fault == '' .and. element == assignment%subscript - 1) &
-         fault = 'has no value: it '//allowed_phrase(value%entry)
+         fault = 'has no value: '//allowed_phrase(value%entry)
       if (fault == '') return
       if (value%good) call faults%add(place(group, value), fault//line_note(group, value))
       value%good = .false.

@@ -42,8 +42,11 @@ contains
       character(:), allocatable :: temporary, result_name
       character(200) :: reason
       integer :: unit, status, closed, i
+      logical :: by_time
 
       if (allocated(error)) return
+      ! Readers show only one of the snapshots of a time. If several have the same, the rows take the place of the times.
+      by_time = all(snapshots(2:)%time > snapshots(:size(snapshots) - 1)%time)
       temporary = path//'.new'
       result_name = escaped(name_of(result_path))
       open (newunit=unit, file=temporary, status='replace', action='write', iostat=status, &
@@ -58,7 +61,8 @@ contains
          '<Grid Name="snapshots" GridType="Collection" CollectionType="Temporal">'
       do i = 1, size(snapshots)
          if (status /= 0) exit
-         call write_snapshot(unit, result_name, grid, snapshots(i), status, reason)
+         call write_snapshot(unit, result_name, grid, snapshots(i), &
+            merge(snapshots(i)%time, real(snapshots(i)%step, dp), by_time), status, reason)
       end do
       if (status == 0) write (unit, '(a)', iostat=status, iomsg=reason) &
          '</Grid>'//new_line('a')//'</Domain>'//new_line('a')//'</Xdmf>'
@@ -77,11 +81,12 @@ contains
    end subroutine write_xdmf
 
    !> Write one snapshot: the grid, the height map and the fields.
-   subroutine write_snapshot(unit, result_name, grid, snapshot, status, reason)
+   subroutine write_snapshot(unit, result_name, grid, snapshot, time, status, reason)
       integer, intent(in) :: unit
       character(*), intent(in) :: result_name
       type(grid_type), intent(in) :: grid
       type(snapshot_type), intent(in) :: snapshot
+      real(dp), intent(in) :: time           !! or the row, if times repeat
       integer, intent(out) :: status
       character(*), intent(inout) :: reason
       character(:), allocatable :: folder
@@ -94,7 +99,7 @@ contains
          '0 0 0</DataItem>", /, '// &
          '"<DataItem Dimensions=""3"" NumberType=""Float"" Precision=""8"" Format=""XML"">'// &
          '", 3es24.16, "</DataItem>", /, "</Geometry>")', iostat=status, iomsg=reason) &
-         snapshot_name(snapshot%step), snapshot%time, grid%ny, grid%nx, grid%dx, grid%dy, grid%dx
+         snapshot_name(snapshot%step), time, grid%ny, grid%nx, grid%dx, grid%dy, grid%dx
       if (status /= 0) return
       call write_field(unit, 'height', result_name//':/surface/height', grid, .false., status, &
          reason)

@@ -44,20 +44,30 @@ contains
       logical, intent(in) :: ends                    !! the run ends here
       type(patch_size_type), intent(inout) :: widest !! the best resolved ones so far
       character(:), allocatable, intent(out) :: message
+      logical :: is_widest
 
       message = ''
-      if (patches%across/patches%needed > widest%across/widest%needed) widest = patches
-      if (ends) message = size_warning(grid, widest)
+      is_widest = patches%across/patches%needed >= widest%across/widest%needed
+      if (is_widest) widest = patches
+      if (.not. ends) return
+      if (is_widest) then
+         message = size_warning(grid, widest)
+      else
+         message = size_warning(grid, widest, 'at the end of no phase are patches of contact more than ')
+      end if
    end subroutine watch_contact_size
 
    !> A warning if the patches are not wide enough; '' otherwise, and if nothing touches.
-   function size_warning(grid, patches) result(message)
+   function size_warning(grid, patches, beginning) result(message)
       type(grid_type), intent(in) :: grid
       type(patch_size_type), intent(in) :: patches
+      character(*), intent(in), optional :: beginning   !! of the message, instead of that for the present contact
       character(:), allocatable :: message
-      character(:), allocatable :: consequence
+      character(:), allocatable :: consequence, start
 
       message = ''
+      start = 'patches of contact are only '
+      if (present(beginning)) start = beginning
       if (patches%across >= patches%needed .or. .not. patches%across > 0.0_dp) return
       if (nint(min(grid%cells(), 2.0_dp)) == 1) return
 
@@ -65,7 +75,7 @@ contains
       if (.not. patches%needed > needed_by_many) &
          consequence = 'the contact area is more than 10 % too large, and approach and pressures depend on the cells'
       ! The cells are counted in tenths, the factor is rounded up.
-      message = 'patches of contact are only '//tenths(patches%across)//' cells across on average: below '// &
+      message = start//tenths(patches%across)//' cells across on average: below '// &
          tenths(patches%needed)//' '//consequence//'; use cells at most 1/'// &
          tenths(patches%needed/patches%across + 0.05_dp)// &
          ' as wide for the same road, if need be on a smaller map around the contact'

@@ -119,6 +119,8 @@ contains
       row%mean_gap = sums%gap/cells
       row%road_x = plan%road(1)
       row%road_y = plan%road(2)
+      row%sliding_speed = 0.0_dp                    ! without friction the surface does not move along the road
+      if (plan%dt > 0.0_dp) row%sliding_speed = dot_product(contact%state%velocity, contact%state%direction)
       row%friction_viscous = 0.0_dp
       if (abs(sums%pressure) > 0.0_dp) row%friction_viscous = &
          dot_product(sums%force, contact%state%direction)/(sums%pressure*contact%grid%cell_area())

@@ -284,6 +284,12 @@ contains
          call project_simplex(pressure, 0.0_dp)
          return
       end if
+      if (problem%control == control_approach .and. problem%target <= 0.0_dp .and. .not. present(past)) then
+         ! The surfaces touch at most. A small pressure would be within the tolerance, but none is exact.
+         pressure(:, :) = 0.0_dp
+         problem%warm = .false.
+         return
+      end if
       if (problem%warm) then
          call rescale(problem, grid, operator%threads, pressure, usable)
          problem%warm = usable
