@@ -227,6 +227,17 @@ def test_overview_of_friction(frictional):
         asperity.open(frictional).plot(x="step")
 
 
+def test_overview_of_friction_without_maps_shows_its_history(frictional):
+    """Snapshots need not store pressure and contact: `snapshot_fields = 'gap'`."""
+    with h5py.File(frictional, "a") as file:
+        for snapshot in file["snapshots"].values():
+            for name in {"pressure", "contact"} & set(snapshot):
+                del snapshot[name]
+    figure = asperity.open(frictional).plot()
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "friction coefficient", "contact area fraction", "sliding speed (mm/s)"]
+
+
 def test_nothing_overlaps_on_the_contact_map(frictional):
     axes = asperity.open(frictional).snapshots[-1].plot("contact")
     figure = axes.figure

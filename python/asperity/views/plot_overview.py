@@ -41,7 +41,8 @@ def plot_overview(run: Run) -> Figure:
     last maps of pressure and gap, and one of these: contact area (and viscous friction) over time;
     for a growing load, the contact area against the load, with Persson's theory if the road is
     rough and the material elastic; for a single solve, a section through the contact. A curve of
-    steady states is drawn over the sliding speed. A run without snapshots shows its history.
+    steady states is drawn over the sliding speed. A run whose snapshots have none of these fields,
+    or that has no snapshots, shows its history.
 
     Parameters
     ----------
@@ -109,7 +110,7 @@ def _frictional_overview(run: Run) -> Figure:
         if log:
             panel.set_xscale("log")
     panels[-1].set_xlabel(head)
-    if snapshot is not None:
+    if snapshot is not None and maps:
         for name, panel in zip(maps, parts[-1].subplots(len(maps), 1, squeeze=False)[:, 0],
                                strict=True):
             plot_field(snapshot, name, panel)
