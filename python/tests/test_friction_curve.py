@@ -931,6 +931,37 @@ def test_lists_may_begin_with_a_minus(tmp_path, monkeypatch, capsys):
     assert main(["friction", *words, "--angle", "-1e1"]) == 0
 
 
+@pytest.mark.parametrize(("option", "given", "expected"), [
+    ("speeds", "1e-3:1:4", [1e-3, 1e-2, 1e-1, 1.0]),
+    ("pressures", "1e5:4e5:3", [1e5, 2e5, 4e5]),
+    ("temperatures", "20:80:4", [20.0, 40.0, 60.0, 80.0]),
+    ("temperatures", "-20:80:5", [-20.0, 5.0, 30.0, 55.0, 80.0]),
+    ("temperatures", "-0.1:0.2:4", [-0.1, 0.0, 0.1, 0.2]),
+    ("temperatures", "-30:-10:2", [-30.0, -10.0]),
+])
+def test_ranges_have_equal_ratios_but_those_of_temperatures_equal_steps(
+        tmp_path, monkeypatch, option, given, expected):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    found = []
+    monkeypatch.setattr(CurvePlan, "summary", lambda plan, _: found.append(plan) or "")
+    assert main(["friction", ROAD, "--material", "r.nml", "--cells", "32", "--plan",
+                 f"--{option}", given]) == 0
+    assert getattr(found[0], option.removesuffix("s")).tolist() == expected
+
+
+@pytest.mark.parametrize(("option", "given", "ends"), [
+    ("speeds", "0:1:3", "0 < FIRST < LAST"), ("speeds", "1:inf:3", "0 < FIRST < LAST"),
+    ("temperatures", "80:20:3", "with FIRST < LAST"), ("temperatures", "0:20:1", "COUNT of at"),
+    ("temperatures", "-inf:20:3", "with FIRST < LAST"),
+])
+def test_ranges_that_are_refused(capsys, option, given, ends):
+    with pytest.raises(SystemExit) as error:
+        main(["friction", ROAD, "--material", "r.nml", f"--{option}={given}"])
+    assert error.value.code == 2
+    assert ends in capsys.readouterr().err
+
+
 def test_too_little_memory_is_no_traceback(tmp_path, monkeypatch, capsys):
     def without_memory(*_, **__):
         raise MemoryError("Unable to allocate 74.5 GiB")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,19 +29,38 @@ def numbers(text: str) -> list[float]:
     >>> numbers("1e5,3e5"), numbers("0.01:1:3")
     ([100000.0, 300000.0], [0.01, 0.1, 1.0])
     """
+    return _list_or_range(text, log=True)
+
+
+def temperatures(text: str) -> list[float]:
+    """Return the numbers of a list, or of ``FIRST:LAST:COUNT`` in even steps, of any sign.
+
+    Examples
+    --------
+    >>> temperatures("40,-5"), temperatures("-20:80:5")
+    ([40.0, -5.0], [-20.0, 5.0, 30.0, 55.0, 80.0])
+    """
+    return _list_or_range(text, log=False)
+
+
+def _list_or_range(text: str, log: bool) -> list[float]:
+    """Return the numbers of a list or a range, which has even steps on a log or a linear scale."""
     parts = text.split(":")
     try:
         if len(parts) == 1:
             return [float(part) for part in text.split(",")]
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 or not 0.0 < first < last or count < 2:
+        if (len(parts) != 3 or not (0.0 if log else -math.inf) < first < last < math.inf
+                or count < 2):
             raise ValueError
     except (ValueError, IndexError):
         raise argparse.ArgumentTypeError(
-            f"{text!r}: must be numbers with commas, or FIRST:LAST:COUNT with 0 < FIRST < LAST and"
-            " COUNT of at least 2") from None
-    found = [float(f"{value:.12g}") for value in np.geomspace(first, last, count)]
-    return found
+            f"{text!r}: must be numbers with commas, or FIRST:LAST:COUNT with"
+            f" {'0 < ' if log else ''}FIRST < LAST and COUNT of at least 2") from None
+    if log:
+        return [float(f"{value:.12g}") for value in np.geomspace(first, last, count)]
+    # A temperature that is 0 up to round-off is 0, and never -0.
+    return [round(float(value), 9) + 0.0 for value in np.linspace(first, last, count)]
 
 
 def add_friction(verbs: Any) -> None:
@@ -69,11 +89,14 @@ def add_friction(verbs: Any) -> None:
 def _add_points(parser: argparse.ArgumentParser) -> None:
     """Add the options for the points of the curve and for the interface."""
     parser.add_argument("--speeds", type=numbers, default=numbers("1e-4:10:25"), metavar="V",
-                        help="speeds, m/s: FIRST:LAST:COUNT or a list (default: 1e-4:10:25)")
+                        help="speeds, m/s: a list, or FIRST:LAST:COUNT with equal ratios"
+                             " (default: 1e-4:10:25)")
     parser.add_argument("--pressures", type=numbers, default=[2e5], metavar="P",
-                        help="pressures, Pa (default: 2e5)")
-    parser.add_argument("--temperatures", type=numbers, metavar="T",
-                        help="temperatures, C (default: that of the rubber)")
+                        help="pressures, Pa: a list, or FIRST:LAST:COUNT with equal ratios"
+                             " (default: 2e5)")
+    parser.add_argument("--temperatures", type=temperatures, metavar="T",
+                        help="temperatures, C: a list, or FIRST:LAST:COUNT in equal steps"
+                             " (default: that of the rubber)")
     parser.add_argument("--coefficient", type=float, default=0.0, metavar="MU",
                         help="Coulomb's coefficient in the interface (default: 0, no friction)")
     parser.add_argument("--slope", action="store_true",
