@@ -557,6 +557,40 @@ def scattered(curve):
     return found
 
 
+@pytest.mark.parametrize("decades", [0.2, 1, 3, 6, 12, 25])
+def test_the_axis_of_the_area_has_labels_over_any_number_of_decades(curve, decades):
+    area = np.geomspace(10.0**-decades, 1.0, curve.values["contact_area"].size)
+    theory = {name: np.ones(array.shape) for name, array in curve.theory.items()}
+    figure = replace(curve, theory=theory, values={
+        **curve.values, "contact_area": area.reshape(curve.values["contact_area"].shape)}).plot()
+    figure.canvas.draw()
+    panel = figure.axes[-1]
+    low, high = panel.get_ylim()
+    labels = [text for text in panel.get_yticklabels()
+              if text.get_text() and low <= text.get_position()[1] <= high]
+    assert 3 <= len(labels) <= 14
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(one.overlaps(other) for one, other in zip(boxes, boxes[1:], strict=False))
+
+
+def test_a_single_point_shows_its_interval_and_the_theory(curve):
+    """It has no ribbon and no line: its interval is a bar, and the theory has a marker."""
+    few = {name: array[:1, :1, :1] for name, array in curve.values.items()}
+    theory = {name: array[:1, :1, :1] for name, array in curve.theory.items()}
+    one = replace(curve, pressure=curve.pressure[:1], temperature=curve.temperature[:1],
+                  speed=curve.speed[:1], values=few, theory=theory, remarks=[], losses={},
+                  sources={})
+    figure = one.plot()
+    panel = figure.axes[1]
+    (bar,) = panel.collections
+    ((low, high),) = [segment[:, 1] for segment in bar.get_segments()]
+    assert [low, high] == [end.item() for end in one.mean("friction_viscous")[1:]]
+    (persson,) = (line for line in panel.lines if line.get_marker() == "_")
+    assert persson.get_ydata() == theory["friction_persson"].ravel()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "runs", "95 % interval", "Persson's theory"]
+
+
 def test_intervals_below_zero_reach_the_edge_of_a_logarithmic_axis(curve):
     panel = scattered(curve).plot().axes[-1]
     bottom = panel.get_ylim()[0]

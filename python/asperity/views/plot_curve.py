@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import (
+    LogFormatterSciNotation,
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    StrMethodFormatter,
+)
 
 from .style import COLOURS, DOUBLE_COLUMN, print_style, shown_once, si_scale
 
@@ -20,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_friction_curve"]
 
 _MARKERS = "o", "x"  # of points with warnings, and of those with states that are left out
+_FEW_DECADES = 1000.0   # ratio of the ends of an axis up to which 1, 2 and 5 are labelled
 
 
 def plot_friction_curve(curve: FrictionCurve) -> Figure:
@@ -42,6 +49,9 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     along = next((name for name, values in axes.items() if values.size > 1), "speed")
     order = ("pressure", "temperature", "speed")
     place = order.index(along)
+    # A single point has neither a ribbon nor a line: its interval is a bar, the theory a dash.
+    alone = axes[along].size == 1
+    dashes = "_" if alone else "--"
     with print_style():
         panels = [("friction", "", "friction coefficient"),
                   ("friction_viscous", "friction_persson", "viscous friction coefficient"),
@@ -63,12 +73,15 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
                 mean, low, high = (part[tuple(where)] for part in curve.mean(name))
                 if panel is places[-1]:
                     low = np.where(low <= 0.0, floor, low)
-                panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
+                if alone:
+                    panel.vlines(axes[along], low, high, color=colour, alpha=0.4, linewidth=3.0)
+                else:
+                    panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
                 panel.plot(axes[along], mean, "o-", color=colour, label=label or "runs")
                 _mark(panel, axes[along], mean, [one[tuple(where)] for one in flagged], colour)
                 if theory:
-                    panel.plot(axes[along], curve.theory[theory][tuple(where)], "--",
-                               color=colour, linewidth=0.9)
+                    panel.plot(axes[along], curve.theory[theory][tuple(where)], dashes,
+                               color=colour, linewidth=0.9, markersize=7)
         for panel, (_, _, text) in zip(places, panels, strict=True):
             if along != "temperature":
                 panel.set_xscale("log")
@@ -81,21 +94,44 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         places[-1].set_yscale("log")
         if (curve.mean("contact_area")[1] <= 0.0).any():
             places[-1].set_ylim(bottom=floor)
-        places[-1].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        places[-1].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        places[-1].yaxis.set_minor_formatter(NullFormatter())
-        _legend(figure, places[0], flagged,
+        _mark_decades(places[-1])
+        _legend(figure, places[0], flagged, dashes,
                 any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in panels))
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return shown_once(figure)
 
 
-def _legend(figure: Figure, panel: Axes, flagged: list[NDArray[np.bool_]], intervals: bool
-            ) -> None:
-    """Draw the legend beside the panels, because the intervals may fill them."""
-    if intervals:
+def _mark_decades(panel: Axes) -> None:
+    """Label 1, 2 and 5 of each decade of the vertical axis, or over many decades some powers of 10.
+
+    An axis that is much shorter than a decade has equally spaced ticks.
+    LogLocator with `subs` gives no ticks at all if it has to leave out decades.
+    """
+    low, high = panel.get_ylim()
+    if high <= 4.0 * low:
+        panel.yaxis.set_major_locator(MaxNLocator(nbins=6))
+        panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    elif high <= _FEW_DECADES * low:
+        panel.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=20))
+        panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    else:
+        panel.yaxis.set_major_locator(LogLocator(numticks=7))
+        panel.yaxis.set_major_formatter(LogFormatterSciNotation())
+    panel.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _legend(figure: Figure, panel: Axes, flagged: list[NDArray[np.bool_]], dashes: str,
+            intervals: bool) -> None:
+    """Draw the legend beside the panels, because the intervals may fill them.
+
+    With a marker in place of dashes, the intervals are bars.
+    """
+    if intervals and dashes == "--":
         panel.fill_between([], [], [], color="k", alpha=0.2, linewidth=0, label="95 % interval")
-    panel.plot([], [], "k--", linewidth=0.9, label="Persson's theory")
+    elif intervals:
+        panel.plot([], [], "|", color="k", alpha=0.4, markersize=9, markeredgewidth=3.0,
+                   label="95 % interval")
+    panel.plot([], [], f"k{dashes}", linewidth=0.9, markersize=7, label="Persson's theory")
     for some, marker, text in zip(flagged, _MARKERS, ("with warnings", "not converged"),
                                   strict=True):
         if some.any():
