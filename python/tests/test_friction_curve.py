@@ -385,6 +385,21 @@ def test_files_that_are_too_large_end_with_status_3(tmp_path, size):
     assert not list(tmp_path.glob("**/*.new*"))
 
 
+@pytest.mark.parametrize("executor", [False, True])
+def test_an_input_that_cannot_be_written_is_named(tmp_path, executor):
+    patch = small_plan(patches=1).road.patch(0)
+    patch.save(tmp_path)  # which is larger than the limit below
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    means = Means(1, executor=ThreadPoolExecutor(1)) if executor else Means(1)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (40, before[1]))
+    try:
+        with pytest.raises(OSError, match=rf"{patch.code}-p200000-T20-\w+\.nml: cannot be written"):
+            run_curve(small_plan(patches=1), tmp_path, means, quiet=True)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.glob("*.nml"))
+
+
 SBATCH = """#!/bin/sh
 # A stand-in for Slurm: notes the call, and runs the tasks of an array one after the other.
 echo "$@" >> "{folder}/calls"

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import IO, Any
 
+from ..base.files import new_file
 from ..base.library import call, version
 from ..results import Run, open_result
 from . import namelists
@@ -96,7 +97,8 @@ def text_of(job: Job) -> str:
 def write_input(job: Job) -> Path:
     """Write the input of a job beside its result, and return its path."""
     path = job.path.with_suffix(".nml")
-    path.write_bytes(namelists.encode(text_of(job)))
+    with new_file(path) as new:  # which names the file in its message on a full disk
+        new.write_bytes(namelists.encode(text_of(job)))
     return path
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..base.check import shown, whole
+from ..base.files import write_text
 from .jobs import Job, Stops, found_result, run_here, write_input
 from .program import program
 from .progress import Progress
@@ -236,9 +237,9 @@ def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
                                 " Slurm")
     for job in waiting:
         write_input(job)
-    (folder / "waiting.txt").write_text("".join(f"{job.name}\n" for job in waiting))
+    write_text(folder / "waiting.txt", "".join(f"{job.name}\n" for job in waiting))
     script = folder / "job.sh"
-    script.write_text(_SCRIPT.format(
+    write_text(script, _SCRIPT.format(
         names="waiting.txt", folder=shlex.quote(str(folder.resolve())), threads=threads,
         program=shlex.quote(program())))
     words = [command, "--parsable", f"--array=0-{len(waiting) - 1}", f"--cpus-per-task={threads}",
@@ -247,7 +248,7 @@ def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
     if done.returncode:
         raise OSError(f"sbatch ended with status {done.returncode}: {done.stderr.strip()}")
     number = done.stdout.strip().split(";")[0]
-    (folder / _QUEUE).write_text(json.dumps({"job": number, "cases": len(waiting)}) + "\n")
+    write_text(folder / _QUEUE, json.dumps({"job": number, "cases": len(waiting)}) + "\n")
     return f"submitted to Slurm as job {number}"
 
 

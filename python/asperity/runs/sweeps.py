@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..base.check import choice, shown
-from ..base.files import make_folder
+from ..base.files import make_folder, write_text
 from ..results import Run, open_result
 from ..results.steady import steady_mean
 from . import namelists
@@ -328,7 +328,7 @@ def _write_index(folder: Path, work: list[Job]) -> None:
             found = json.loads(path.read_text())
             index = found if isinstance(found, dict) else {}
     index.update({f"{job.name}.h5": job.values for job in work})
-    path.write_text(json.dumps(index, indent=1, default=str) + "\n")
+    write_text(path, json.dumps(index, indent=1, default=str) + "\n")
 
 
 def _table(work: list[Job], shape: tuple[int, ...],
