@@ -329,6 +329,8 @@ def test_command(result, capsys):
     (["-o", "/nowhere/at/all.png"], 3, "all.png"),
     (["-o", "picture.xyz"], 2, "picture.xyz: the ending must be .png"),
     (["-o", "picture"], 2, "picture: the ending must be .png"),
+    (["--show"], 2, "--show: no window can be opened: there is no display"),
+    (["--show", "--field", "gap"], 2, "--show: no window can be opened"),
 ])
 def test_command_errors(result, capsys, words, status, message):
     assert main(["plot", str(result), *words]) == status

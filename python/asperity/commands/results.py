@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["add_plot", "add_report", "add_watch"]
 
@@ -23,7 +26,7 @@ def add_plot(verbs: Any) -> None:
                       help="picture to write (.png, .pdf, .svg; a film .gif, .mp4);"
                            " default: RESULT.png beside the result")
     plot.add_argument("--show", action="store_true",
-                      help="open a window instead of writing a file")
+                      help="open a window instead of writing a file; needs a display")
     what = plot.add_mutually_exclusive_group()
     what.add_argument("--field", metavar="NAME",
                       help="draw a field of a snapshot, for example pressure; contact shows which"
@@ -76,6 +79,10 @@ def _plot(chosen: argparse.Namespace) -> int:
     else:
         figure = run.overview()
     if chosen.show:
+        if not _has_windows(figure):
+            raise ValueError("--show: no window can be opened: there is no display, or the backend"
+                             f" {matplotlib.get_backend()!r} of matplotlib has no windows; without"
+                             " --show a picture is written")
         plt.show()
         return 0
     output = chosen.output or run.path.with_suffix(".png")
@@ -83,6 +90,15 @@ def _plot(chosen: argparse.Namespace) -> int:
     plt.close(figure)
     print(f"wrote {output}")
     return 0
+
+
+def _has_windows(figure: Figure) -> bool:
+    """Return whether the backend of matplotlib shows figures. Some do nothing without a word."""
+    from matplotlib.backend_bases import FigureManagerBase
+
+    kinds = figure.canvas.manager_class.__mro__
+    return any({"show", "pyplot_show"} & set(vars(kind))
+               for kind in kinds[:kinds.index(FigureManagerBase)])
 
 
 def _film(run: Any, chosen: argparse.Namespace) -> int:
