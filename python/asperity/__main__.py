@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import os
 import re
 import signal
@@ -57,11 +58,23 @@ def _run(arguments: list[str]) -> int:
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
     for add in (add_plot, add_import, add_fit, add_friction, add_report, add_watch):
         add(verbs)
-    chosen = parser.parse_args(with_negative_lists(arguments))
+    chosen, unknown = parser.parse_known_args(with_negative_lists(arguments))
+    if unknown:
+        _refuse(unknown, verbs.choices[chosen.verb])
     if chosen.verb == "watch":  # which ends when nobody reads it
         return chosen.call(chosen)
     with patient_output():
         return chosen.call(chosen)
+
+
+def _refuse(unknown: list[str], verb: argparse.ArgumentParser) -> None:
+    """End with the usage of a verb, and name its options that resemble the unknown words."""
+    # The parser of all verbs would print its own usage.
+    options = re.findall(r"--[a-z]+(?:-[a-z]+)*(?![-a-z])", verb.format_help())
+    near = [found for word in unknown if word.startswith("--")
+            for found in difflib.get_close_matches(word.partition("=")[0], options, n=1)]
+    hint = f"; did you mean {' or '.join(dict.fromkeys(near))}?" if near else ""
+    verb.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
 
 
 def with_negative_lists(arguments: list[str]) -> list[str]:

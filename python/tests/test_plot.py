@@ -337,6 +337,21 @@ def test_command_errors(result, capsys, words, status, message):
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("words", "message"), [
+    (["plot", "a.h5", "--fild", "gap"],
+     "unrecognized arguments: --fild gap; did you mean --field?"),
+    (["friction", "a.h5", "--material", "r.nml", "--presures=1e5"], "did you mean --pressures?"),
+    (["friction", "a.h5", "--material", "r.nml", "--bad", "3"], "unrecognized arguments: --bad 3"),
+])
+def test_unknown_options_get_the_usage_of_their_verb(capsys, words, message):
+    with pytest.raises(SystemExit) as error:
+        main(words)
+    assert error.value.code == 2
+    printed = capsys.readouterr().err
+    assert f"asperity {words[0]} [-h]" in printed
+    assert message in printed
+
+
 def test_command_from_the_shell(result, tmp_path):
     def call(*words):
         return subprocess.run([sys.executable, "-m", "asperity", *words], capture_output=True,
