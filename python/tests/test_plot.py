@@ -432,6 +432,36 @@ def test_data_of_one_sign_have_a_scale_of_one_sign(frictional):
     assert snapshot.plot("pressure").images
 
 
+@pytest.mark.parametrize(("nx", "ny"), [(1024, 4), (4, 1024)])
+@pytest.mark.parametrize("name", ["pressure", "contact"])
+def test_labels_of_very_oblong_maps_do_not_overlap(tmp_path, nx, ny, name):
+    path = frictional_result(tmp_path / "oblong.h5", nx=nx, ny=ny, lx=nx * 1e-5, ly=ny * 1e-5)
+    axes = asperity.open(path).snapshots[-1].plot(name)
+    axes.figure.canvas.draw()
+    assert "stretched 32 times" in axes.get_xlabel()
+    box = axes.get_window_extent()
+    assert box.width / box.height == pytest.approx(8.0 if nx > ny else 1 / 8, rel=1e-3)
+    for axis, limits in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+        labels = [tick.label1 for tick in axis.get_major_ticks()
+                  if limits[0] <= tick.get_loc() <= limits[1]]
+        boxes = [label.get_window_extent() for label in labels] + [axis.label.get_window_extent()]
+        if name == "contact" and axis is axes.xaxis:
+            boxes.append(axes.get_legend().get_window_extent())
+        assert len(labels) >= 2
+        assert not any(one.overlaps(other) for number, one in enumerate(boxes)
+                       for other in boxes[number + 1:])
+
+
+def test_arrows_on_a_stretched_map_have_the_directions_of_the_tractions(tmp_path):
+    path = frictional_result(tmp_path / "oblong.h5", nx=1024, ny=4, lx=1024e-5, ly=4e-5)
+    axes = asperity.open(path).snapshots[-1].plot("contact")
+    axes.figure.canvas.draw()
+    (arrows,) = (item for item in axes.collections if isinstance(item, Quiver))
+    assert arrows.angles == "uv"
+    # The scale is that of a map on which x and y have the same scale.
+    assert arrows.scale_units == "x"
+
+
 def test_the_label_of_a_bar_is_whole_on_a_flat_map(tmp_path):
     path = tmp_path / "flat.h5"
     write_result(path, nx=48, ny=24, lx=2e-3, ly=1e-3)

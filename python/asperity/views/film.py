@@ -18,7 +18,7 @@ from ..base.files import PICTURE, check_output, new_file
 from ..results.settings import has_friction
 from ..results.steady import steady_speeds
 from .colour_scales import field_style, mark_scale, state_style, without_open_cells
-from .plot_fields import frame_of
+from .plot_fields import frame_of, stretch_of, write_lengths
 from .plot_history import horizontal, steady_words
 from .style import (
     COLOURS,
@@ -138,9 +138,10 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
         1, 2, figsize=(DOUBLE_COLUMN, 1.1 + 2.9 * ratio), layout="constrained",
         width_ratios=(1.25, 1.0))
     _, unit, edges = frame_of(grid)
+    stretch = stretch_of(grid.lx, grid.ly)
     if field == "contact":
         image = panel.imshow(snapshots[0][field], origin="lower", extent=edges,
-                             interpolation="nearest", **state_style(run))
+                             aspect=stretch, interpolation="nearest", **state_style(run))
         names = (((NO_CONTACT, "open"), (STICK, "stick"), (SLIP, "slip")) if has_friction(run)
                  else ((NO_CONTACT, "open"), (STICK, "contact")))
         figure.legend(handles=[Patch(facecolor=colour, edgecolor="#888888", linewidth=0.5,
@@ -150,12 +151,11 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
         factor, scale_unit, style = field_style(_sample(snapshots, field), field,
                                                 snapshots[0].units(field))
         image = panel.imshow(without_open_cells(snapshots[0][field] * factor, field),
-                             origin="lower", extent=edges, **style)
+                             origin="lower", extent=edges, aspect=stretch, **style)
         tall = float(np.clip(grid.ly / grid.lx, 0.1, 2.5))  # the bar is as tall as the map
         bar = figure.colorbar(image, ax=panel, fraction=0.046 * tall, pad=0.03)
         mark_scale(bar, axis_text(label_of(field, snapshots[0]), scale_unit))
-    panel.set_xlabel(f"x ({unit})")
-    panel.set_ylabel(f"y ({unit})")
+    write_lengths(panel, unit, stretch)
 
     along, column, mark = _curve(run, curve)
     curve.set_box_aspect(max(ratio, 0.6))

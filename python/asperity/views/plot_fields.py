@@ -38,9 +38,10 @@ if TYPE_CHECKING:
 
     from ..results import Grid, Snapshot
 
-__all__ = ["frame_of", "plot_field", "plot_section"]
+__all__ = ["frame_of", "plot_field", "plot_section", "stretch_of", "write_lengths"]
 
 ARROWS = 22  # along the longer side
+_MOST_OBLONG = 8.0  # ratio of the sides of a map up to which both have the same scale
 
 
 def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = None,
@@ -152,6 +153,50 @@ def frame_of(grid: Grid) -> tuple[float, str, tuple[float, float, float, float]]
     return length, unit, edges
 
 
+def stretch_of(width: float, height: float) -> float:
+    """Return the scale of y over that of x with which a map is drawn: 1, unless it is very oblong.
+
+    Parameters
+    ----------
+    width, height : float
+        Sides of the part that is shown, in the same unit.
+
+    Returns
+    -------
+    float
+        The argument `aspect` of `imshow`.
+
+    Examples
+    --------
+    >>> stretch_of(2.0, 1.0), stretch_of(1024.0, 4.0), stretch_of(4.0, 1024.0)
+    (1.0, 32.0, 0.03125)
+    """
+    ratio = height / width
+    return float(np.clip(ratio, 1.0 / _MOST_OBLONG, _MOST_OBLONG)) / ratio
+
+
+def write_lengths(axes: Axes, unit: str, stretch: float) -> None:
+    """Label the axes of a map, and say which one is stretched.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        Axes of the map.
+    unit : str
+        Unit of both lengths.
+    stretch : float
+        The value of `stretch_of`.
+    """
+    more = ""
+    if stretch > 1.0:
+        more = f"; y is stretched {stretch:.3g} times"
+    elif stretch < 1.0:
+        more = f", stretched {1.0 / stretch:.3g} times"
+        axes.tick_params(axis="x", labelrotation=90)  # the axis is too short for labels in a row
+    axes.set_xlabel(f"x ({unit}){more}")
+    axes.set_ylabel(f"y ({unit})")
+
+
 def _bar_lies(text: str, ratio: float, width: float) -> bool:
     """Return whether the colour bar should be below a map of this width, in inches."""
     needed = 0.6 * len(text) * plt.rcParams["axes.labelsize"] / 72.0
@@ -169,7 +214,8 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min",
               (True, True): "both"}[above, below]
     _, length_unit, edges = frame_of(grid)
-    image = axes.imshow(shown, origin="lower", extent=edges, aspect="equal", **style)
+    stretch = stretch_of(grid.lx, grid.ly)
+    image = axes.imshow(shown, origin="lower", extent=edges, aspect=stretch, **style)
     ratio = float(np.clip(grid.ly / grid.lx, 0.25, 2.5))
     text = axis_text(label, unit)
     # A bar beside the map is as tall as the map, which limits the length of its label.
@@ -179,8 +225,7 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
                                **({"orientation": "horizontal", "pad": 0.12} if lies
                                   else {"fraction": 0.046 * ratio, "pad": 0.03}))
     mark_scale(bar, text)
-    axes.set_xlabel(f"x ({length_unit})")
-    axes.set_ylabel(f"y ({length_unit})")
+    write_lengths(axes, length_unit, stretch)
 
 
 def _states(snapshot: Snapshot, contact: NDArray[Any]) -> tuple[list[str], list[str]]:
@@ -199,23 +244,24 @@ def _contact_map(snapshot: Snapshot, contact: NDArray[Any], axes: Axes) -> None:
     """Draw the map of open, sticking and slipping cells."""
     colours, names = _states(snapshot, contact)
     _, unit, edges = frame_of(snapshot.run.grid)
-    axes.imshow(contact, origin="lower", extent=edges, aspect="equal",
-                interpolation="nearest", **state_style(snapshot.run))
     length, _, _ = frame_of(snapshot.run.grid)
     left, right, low, high = (length * end for end in window(snapshot))
+    stretch = stretch_of(right - left, high - low)
+    axes.imshow(contact, origin="lower", extent=edges, aspect=stretch,
+                interpolation="nearest", **state_style(snapshot.run))
     axes.set_xlim(left, right)
     axes.set_ylim(low, high)
-    axes.set_xlabel(f"x ({unit})")
-    axes.set_ylabel(f"y ({unit})")
-    _state_legend(axes, colours, names)
+    write_lengths(axes, unit, stretch)
+    # Labels of ticks that stand upright are about three times as tall.
+    _state_legend(axes, colours, names, 2.0 * plt.rcParams["font.size"] if stretch < 1.0 else 0.0)
 
 
-def _state_legend(axes: Axes, colours: list[str], names: list[str]) -> None:
-    """Draw the legend of the states under the axes."""
+def _state_legend(axes: Axes, colours: list[str], names: list[str], more: float = 0.0) -> None:
+    """Draw the legend of the states under the axes, by some more points if labels are tall."""
     patches = [Patch(facecolor=colour, edgecolor="#888888", linewidth=0.5, label=name)
                for colour, name in zip(colours, names, strict=True)]
     # The legend is below the tick labels and the axis label, whatever the height of the axes.
-    drop = 2.2 * (plt.rcParams["font.size"] + 5.0) / 72.0
+    drop = (2.2 * (plt.rcParams["font.size"] + 5.0) + more) / 72.0
     under = axes.transAxes + ScaledTranslation(0.0, -drop, axes.figure.dpi_scale_trans)
     axes.legend(handles=patches, loc="upper center", bbox_to_anchor=(0.5, 0.0),
                 bbox_transform=under, frameon=False, ncols=len(patches), handlelength=1.0,
@@ -290,8 +336,12 @@ def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
         return False
     largest = scale_limit(sizes)
     longest = 1.5 * length * max(seen / ARROWS, grid.dx, grid.dy)
-    arrows = axes.quiver(grid.x[i] * length, grid.y[j] * length, along_x, along_y, angles="xy",
-                         scale_units="xy", scale=largest / longest, width=0.0045, headwidth=3.6,
+    # On a stretched map, too, the arrows have the directions of the tractions. Lengths and widths
+    # are in parts of its longer side.
+    flat = right - left >= high - low
+    arrows = axes.quiver(grid.x[i] * length, grid.y[j] * length, along_x, along_y, angles="uv",
+                         scale_units="x" if flat else "y", scale=largest / longest,
+                         units="width" if flat else "height", width=0.0045, headwidth=3.6,
                          headlength=4.2, headaxislength=3.8, minlength=0.6, color="black",
                          edgecolor="white", linewidth=0.35, zorder=3, clip_on=True)
     shown = 10.0 ** np.floor(np.log10(largest))
@@ -299,8 +349,9 @@ def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
     factor, unit = si_scale(shown, "Pa")
     # A tenth of an inch above the map, which takes the width or the height of its place.
     place, figure = axes.get_position(), axes.figure
+    ratio = (high - low) / (right - left) * stretch_of(right - left, high - low)
     tall = min(place.height * figure.bbox.height,
-               place.width * figure.bbox.width * (high - low) / (right - left)) / figure.dpi
+               place.width * figure.bbox.width * ratio) / figure.dpi
     axes.quiverkey(arrows, 1.0, 1.0 + 0.09 / max(tall, 0.1), shown,
                    f"traction {shown * factor:.3g} {unit}",
                    labelpos="W", coordinates="axes", labelsep=0.05,

@@ -64,9 +64,10 @@ def plot_overview(run: Run) -> Figure:
         grid = run.grid
         ratio = 0.8 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.4, 1.6))
         count = len(names) + 1
+        below = 0.6 if grid.ny > 1 and grid.ly < 0.45 * grid.lx else 0.0  # inches, for colour bars
         figure, panels = plt.subplots(
             1, count, figsize=(DOUBLE_COLUMN if count > 1 else SINGLE_COLUMN,
-                               1.0 + 1.75 * ratio if count > 1 else 2.7),
+                               1.0 + 1.75 * ratio + below if count > 1 else 2.7),
             layout="constrained", squeeze=False)
         if snapshot is not None:
             for name, panel in zip(names, panels[0], strict=False):
