@@ -352,7 +352,9 @@ def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
     ratio = (high - low) / (right - left) * stretch_of(right - left, high - low)
     tall = min(place.height * figure.bbox.height,
                place.width * figure.bbox.width * ratio) / figure.dpi
-    axes.quiverkey(arrows, 1.0, 1.0 + 0.09 / max(tall, 0.1), shown,
+    # The arrow of the key ends at the right edge of the map, beside which there may be no room.
+    reach = shown / largest * longest / (right - left if flat else (high - low) / ratio)
+    axes.quiverkey(arrows, 1.0 - reach, 1.0 + 0.09 / max(tall, 0.1), shown,
                    f"traction {shown * factor:.3g} {unit}",
                    labelpos="W", coordinates="axes", labelsep=0.05,
                    fontproperties={"size": plt.rcParams["legend.fontsize"]})
