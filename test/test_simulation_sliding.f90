@@ -36,6 +36,7 @@ contains
       if (selected('sphere_crosses_a_free_map')) call sphere_crosses_a_free_map()
       if (selected('contact_at_the_edge_is_reported')) call contact_at_the_edge_is_reported()
       if (selected('contacts_of_few_cells')) call contacts_of_few_cells()
+      if (selected('small_patches_of_an_earlier_phase_are_reported')) call small_patches_of_an_earlier_phase_are_reported()
       if (selected('road_slides_at_its_speed_without_friction')) call road_slides_at_its_speed_without_friction()
    end subroutine run_simulation_sliding
 
@@ -501,6 +502,23 @@ contains
          'few cells', record)
       call check_books(record, 'few cells')
    end subroutine contacts_of_few_cells
+
+   !> The warning about small patches says when they are not those of its own row.
+   subroutine small_patches_of_an_earlier_phase_are_reported()
+      character(*), parameter :: loads(2) = ['1e1', '1e3']
+      character(*), parameter :: expected(2) = [character(52) :: 'even the best resolved patches of contact at the end', &
+         's: patches of contact are only']
+      type(record_type) :: record
+      integer :: k
+
+      do k = 1, 2
+         call run_case('&grid nx = 64, ny = 64, lx = 1e-3 /'//nl// &
+            '&surface shape = ''self_affine'', hurst = 0.8, rms_slope = 0.1, wavelength_long = 0.5e-3 /'//nl// &
+            '&material shear_modulus = 1e6 /'//nl//'&phase pressure = 1e3 /'//nl//'&phase pressure = '//loads(k)//' /', &
+            'patches', record)
+         call check_order(index(record%warnings, trim(expected(k))), '>', 0, 'patches: '//record%warnings)
+      end do
+   end subroutine small_patches_of_an_earlier_phase_are_reported
 
    !> A sphere that crosses a free map agrees with one in a periodic cell far larger than the contact.
    subroutine sphere_crosses_a_free_map()

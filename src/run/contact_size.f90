@@ -44,17 +44,15 @@ contains
       logical, intent(in) :: ends                    !! the run ends here
       type(patch_size_type), intent(inout) :: widest !! the best resolved ones so far
       character(:), allocatable, intent(out) :: message
-      logical :: is_widest
+      character(:), allocatable :: beginning          ! not allocated: that for the present contact
 
       message = ''
-      is_widest = patches%across/patches%needed >= widest%across/widest%needed
-      if (is_widest) widest = patches
-      if (.not. ends) return
-      if (is_widest) then
-         message = size_warning(grid, widest)
+      if (patches%across/patches%needed >= widest%across/widest%needed) then
+         widest = patches
       else
-         message = size_warning(grid, widest, 'at the end of no phase are patches of contact more than ')
+         beginning = 'even the best resolved patches of contact at the end of a phase are only '
       end if
+      if (ends) message = size_warning(grid, widest, beginning)
    end subroutine watch_contact_size
 
    !> A warning if the patches are not wide enough; '' otherwise, and if nothing touches.

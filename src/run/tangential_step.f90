@@ -134,7 +134,8 @@ contains
       ! mass jumps while all cells stick, nothing moves at all. The least scale keeps round-off from being the scale of the
       ! residual.
       self%solver%least_scale = self%q*norm2(merge(0.0_dp, motion, pulled))
-      if (.not. self%solver%least_scale > 0.0_dp) self%solver%least_scale = round_off(self, state)/self%tolerance
+      if (.not. self%solver%least_scale > 0.0_dp) &
+         self%solver%least_scale = round_off(self, state)/self%solver%accepted
       if (.not. dt > 0.0_dp) state%last_dt = 0.0_dp
       self%starts = .not. state%last_dt > 0.0_dp
       call past_traction(state%arms, material, self%past)

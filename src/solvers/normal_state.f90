@@ -280,14 +280,11 @@ contains
       logical :: usable
       integer :: j
 
-      if (problem%control == control_pressure .and. problem%target <= 0.0_dp) then
+      ! Without a load, or at an approach at which the surfaces touch at most, there is no pressure. A small one would be
+      ! within the tolerance, too.
+      if (problem%target <= 0.0_dp .and. (problem%control == control_pressure .or. .not. present(past))) then
          call project_simplex(pressure, 0.0_dp)
-         return
-      end if
-      if (problem%control == control_approach .and. problem%target <= 0.0_dp .and. .not. present(past)) then
-         ! The surfaces touch at most. A small pressure would be within the tolerance, but none is exact.
-         pressure(:, :) = 0.0_dp
-         problem%warm = .false.
+         if (problem%control == control_approach) problem%warm = .false.
          return
       end if
       if (problem%warm) then
