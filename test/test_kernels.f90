@@ -31,14 +31,15 @@ contains
 
    !> A solid of independent springs: every cell moves by its own traction. A solid of this kind needs no more
    !> than this function.
-   pure function spring_wave(self, qx, qy) result(a)
+   pure subroutine spring_wave(self, qx, qy, a)
       class(kernel_type), intent(in) :: self
-      real(dp), intent(in) :: qx, qy
-      real(dp) :: a(3)
+      real(dp), contiguous, intent(in) :: qx(:)
+      real(dp), intent(in) :: qy
+      real(dp), contiguous, intent(out) :: a(:, :)
 
-      a = 0.0_dp*(qx + qy)                            ! all waves have the same stiffness
-      a(:self%components) = 1.0_dp/bedding
-   end function spring_wave
+      a = 0.0_dp*qy                                   ! all waves have the same stiffness
+      a(:size(qx), :self%components) = 1.0_dp/bedding
+   end subroutine spring_wave
 
    !> The kernel of the springs. Their mean displacement is determined like any other.
    function winkler() result(kernel)

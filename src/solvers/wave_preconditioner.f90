@@ -88,18 +88,14 @@ contains
       type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       integer, intent(in) :: first                     !! wave number along x of the first column
       real(dp), intent(out) :: symbol(first:, 0:)
-      real(dp) :: reference, a(3)
-      integer :: i, j
+      real(dp) :: row(size(symbol, 1), 1)
+      integer :: j
 
-      reference = kernel%compliance(2.0_dp*pi/h)
       do j = 0, ubound(symbol, 2)
-         do i = first, ubound(symbol, 1)
-            symbol(i, j) = 0.0_dp
-            if (i == 0 .and. j == 0) cycle
-            a = kernel%wave(2.0_dp*pi*i/grid%lx, 2.0_dp*pi*j/grid%ly)
-            symbol(i, j) = reference/a(1)
-         end do
+         call kernel%grid_row(grid, first, j, row)
+         symbol(:, j) = kernel%compliance(2.0_dp*pi/h)/row(:, 1)
       end do
+      if (first == 0) symbol(0, 0) = 0.0_dp
    end subroutine stiffness_symbols
 
    !> Compute the residual r = scale (level - gap) on S, and zero elsewhere.

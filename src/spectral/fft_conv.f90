@@ -17,7 +17,7 @@
 module fft_conv
    use, intrinsic :: iso_c_binding, only : c_ptr
    use asperity_errors, only : error_input, error_type, fail
-   use computed_symbol, only : columns_computed
+   use computed_symbol, only : computed_symbol_type
    use kernels, only : kernel_type
    use asperity_threads, only : thread_count
    use asperity_precision, only : dp, int64, power_of_two
@@ -340,7 +340,7 @@ contains
       if (self%single) then
          call self%low%columns(self%symbols%low_values, self%symbols%unit, inverse, back, form)
       else if (.not. allocated(self%symbols%values)) then
-         call columns_computed(self%high, self%grid, self%kernel, inverse, form)
+         call self%high%columns_computed(computed_symbol_type(self%grid, self%kernel), inverse, form)
       else
          call self%high%columns(self%symbols%values, self%symbols%unit, inverse, back, form)
       end if

@@ -27,10 +27,11 @@ module kernels
       integer :: components = 1             !! 1: normal, 2: both tangential directions
       real(dp) :: poisson = 0.5_dp          !! -1 < nu <= 0.5
       real(dp) :: mean_mode = 0.0_dp        !! A at zero wave number on a periodic grid, m/Pa
-      procedure(wave_response), pointer :: wave => null()   !! A at a wave vector that is not zero
+      procedure(wave_response), pointer :: wave => null()   !! A at wave vectors that are not zero
       procedure(cell_response), pointer :: cell => null()   !! null if only for periodic grids
    contains
       procedure :: tensor
+      procedure :: grid_row
       procedure :: compliance
       procedure :: least_stiffness
       procedure :: largest_stiffness
@@ -39,14 +40,16 @@ module kernels
    end type kernel_type
 
    abstract interface
-      !> A at a wave vector (qx, qy) /= 0: [a, -, -] for a normal kernel, [xx, yy, xy] for a tangential one.
-      pure function wave_response(self, qx, qy) result(a)
+      !> A at the wave vectors (qx, qy) of a row, none of them zero. All at once, because products compute it for
+      !> many waves.
+      pure subroutine wave_response(self, qx, qy, a)
          import :: dp, kernel_type
          implicit none
          class(kernel_type), intent(in) :: self
-         real(dp), intent(in) :: qx, qy     !! rad/m
-         real(dp) :: a(3)                   !! m/Pa
-      end function wave_response
+         real(dp), contiguous, intent(in) :: qx(:)      !! rad/m
+         real(dp), intent(in) :: qy                     !! rad/m
+         real(dp), contiguous, intent(out) :: a(:, :)   !! [size(qx), 1], or [size(qx), xx, yy and xy], m/Pa
+      end subroutine wave_response
 
       !> The displacement at (x, y) from the centre of a cell dx by dy under a uniform unit traction.
       pure function cell_response(self, x, y, dx, dy) result(a)
@@ -86,25 +89,31 @@ contains
    end function tangential_half_space
 
    !> (1 - nu)/q.
-   pure function half_space_normal_wave(self, qx, qy) result(a)
+   pure subroutine half_space_normal_wave(self, qx, qy, a)
       class(kernel_type), intent(in) :: self
-      real(dp), intent(in) :: qx, qy
-      real(dp) :: a(3)
+      real(dp), contiguous, intent(in) :: qx(:)
+      real(dp), intent(in) :: qy
+      real(dp), contiguous, intent(out) :: a(:, :)
 
-      a = [(1.0_dp - self%poisson)/hypot(qx, qy), 0.0_dp, 0.0_dp]
-   end function half_space_normal_wave
+      a(:, 1) = (1.0_dp - self%poisson)/sqrt(qx**2 + qy**2)
+   end subroutine half_space_normal_wave
 
    !> [1 - nu q q/q^2]/q.
-   pure function half_space_tangential_wave(self, qx, qy) result(a)
+   pure subroutine half_space_tangential_wave(self, qx, qy, a)
       class(kernel_type), intent(in) :: self
-      real(dp), intent(in) :: qx, qy
-      real(dp) :: a(3)
+      real(dp), contiguous, intent(in) :: qx(:)
+      real(dp), intent(in) :: qy
+      real(dp), contiguous, intent(out) :: a(:, :)
       real(dp) :: q
+      integer :: i
 
-      q = hypot(qx, qy)
-      a = [(1.0_dp - self%poisson*(qx/q)**2)/q, (1.0_dp - self%poisson*(qy/q)**2)/q, &
-         -self%poisson*(qx/q)*(qy/q)/q]
-   end function half_space_tangential_wave
+      do i = 1, size(qx)
+         q = sqrt(qx(i)**2 + qy**2)
+         a(i, 1) = (1.0_dp - self%poisson*(qx(i)/q)**2)/q
+         a(i, 2) = (1.0_dp - self%poisson*(qy/q)**2)/q
+         a(i, 3) = -self%poisson*(qx(i)/q)*(qy/q)/q
+      end do
+   end subroutine half_space_tangential_wave
 
    !> Love's coefficient of a normal pressure.
    pure function half_space_normal_cell(self, x, y, dx, dy) result(a)
@@ -124,17 +133,16 @@ contains
       call love_tangential(x, y, dx, dy, self%poisson, a(1), a(3), a(2))
    end function half_space_tangential_cell
 
-   !> A at any wave vector of a periodic grid, the zero one included.
+   !> A at one wave vector that is not zero.
    pure function tensor(self, qx, qy) result(a)
       class(kernel_type), intent(in) :: self
       real(dp), intent(in) :: qx, qy        !! rad/m
-      real(dp) :: a(3)                      !! m/Pa
+      real(dp) :: a(3)                      !! [a, -, -] of a normal kernel, [xx, yy, xy] of a tangential one, m/Pa
+      real(dp) :: elements(1, merge(1, 3, self%components == 1))
 
-      if (max(abs(qx), abs(qy)) > 0.0_dp) then
-         a = self%wave(qx, qy)
-      else
-         a = [self%mean_mode, self%mean_mode, 0.0_dp]
-      end if
+      call self%wave([qx], qy, elements)
+      a = 0.0_dp
+      a(:size(elements)) = elements(1, :)
    end function tensor
 
    !> The first element of A for a wave along x. For a normal kernel this is its compliance.
@@ -144,9 +152,31 @@ contains
       real(dp) :: a                         !! m/Pa
       real(dp) :: elements(3)
 
-      elements = self%wave(q, 0.0_dp)
+      elements = self%tensor(q, 0.0_dp)
       a = elements(1)
    end function compliance
+
+   !> A for some wave numbers along x, from `first` on, and one along y of a periodic grid, the zero one included.
+   pure subroutine grid_row(self, grid, first, j, a)
+      class(kernel_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: first, j                  !! not negative
+      real(dp), contiguous, intent(out) :: a(first:, :)   !! [wave numbers along x, 1 or 3], m/Pa
+      real(dp) :: qx(first:first + size(a, 1) - 1)
+      integer :: i, start
+
+      if (size(a, 1) == 0) return
+      do i = first, ubound(a, 1)
+         qx(i) = 2.0_dp*pi*(i/grid%lx)
+      end do
+      start = first
+      if (first == 0 .and. j == 0) then
+         a(0, :) = self%mean_mode
+         if (self%components > 1) a(0, 3) = 0.0_dp
+         start = 1
+      end if
+      call self%wave(qx(start:), 2.0_dp*pi*(j/grid%ly), a(start:, :))
+   end subroutine grid_row
 
    !> Stiffness of a normal kernel for the longest wave of a grid.
    pure function least_stiffness(self, grid) result(stiffness)
@@ -176,23 +206,25 @@ contains
       integer, intent(in) :: mx, my                    !! lengths of the transforms
       real(dp), intent(out) :: table(0:, 0:, :)        !! [0:mx/2 or less, 0:my/2, 1 or 3], m/Pa
       integer, intent(in), optional :: first           !! wave number along x of table(0, :, :), 0 if absent
-      real(dp) :: a(3)
-      integer :: start, i, j
+      real(dp) :: row(0:size(table, 1) - 1, size(table, 3))
+      integer :: start, j
 
+      if (size(table, 1) == 0) return
       start = 0
       if (present(first)) start = first
       if (grid%boundary /= boundary_periodic) then
          call cell_symbols(self, grid, mx, my, start, table)
          return
       end if
-      !$omp parallel do default(none) shared(self, grid, mx, my, start, table) private(i, j, a)
+      !$omp parallel do default(none) shared(self, grid, mx, my, start, table) private(j, row)
       do j = 0, my/2
-         do i = start, start + size(table, 1) - 1
-            a = self%tensor(2.0_dp*pi*(i/grid%lx), 2.0_dp*pi*(j/grid%ly))
+         call self%grid_row(grid, start, j, row)
+         if (self%components > 1) then
             ! An odd symbol has no value on the Nyquist lines.
-            if (2*i == mx .or. 2*j == my) a(3) = 0.0_dp
-            table(i - start, j, :) = a(:size(table, 3))
-         end do
+            if (2*j == my) row(:, 3) = 0.0_dp
+            if (2*(start + ubound(row, 1)) == mx) row(ubound(row, 1), 3) = 0.0_dp
+         end if
+         table(:, j, :) = row
       end do
    end subroutine symbols
 

@@ -139,9 +139,9 @@ contains
       type(kernel_type), intent(in) :: kernel
       real(dp), intent(in) :: wave(2)                  !! q, rad/m
       integer, intent(in) :: count                     !! wave vectors that the mode stands for
-      real(dp) :: a(3)                                 !! as `wave_response` says, m/Pa
+      real(dp) :: a(3)                                 !! as `tensor` says, m/Pa
 
-      a = kernel%wave(wave(1), wave(2))
+      a = kernel%tensor(wave(1), wave(2))
       if (count > 1) a(3) = 0.0_dp
    end function mode_compliance
 
