@@ -30,7 +30,7 @@ contains
    end subroutine run_kernels
 
    !> A solid of independent springs: every cell moves by its own traction. A solid of this kind needs no more
-   !> than this function.
+   !> than this subroutine.
    pure subroutine spring_wave(self, qx, qy, a)
       class(kernel_type), intent(in) :: self
       real(dp), contiguous, intent(in) :: qx(:)

@@ -88,14 +88,17 @@ contains
       type(kernel_type), intent(in) :: kernel          !! normal response of the solid
       integer, intent(in) :: first                     !! wave number along x of the first column
       real(dp), intent(out) :: symbol(first:, 0:)
-      real(dp) :: row(size(symbol, 1), 1)
-      integer :: j
+      real(dp) :: reference, row(first:ubound(symbol, 1), 1)
+      integer :: j, start
 
+      if (size(symbol, 1) == 0) return
+      reference = kernel%compliance(2.0_dp*pi/h)
       do j = 0, ubound(symbol, 2)
          call kernel%grid_row(grid, first, j, row)
-         symbol(:, j) = kernel%compliance(2.0_dp*pi/h)/row(:, 1)
+         start = merge(1, first, first == 0 .and. j == 0)
+         symbol(:start - 1, j) = 0.0_dp
+         symbol(start:, j) = reference/row(start:, 1)
       end do
-      if (first == 0) symbol(0, 0) = 0.0_dp
    end subroutine stiffness_symbols
 
    !> Compute the residual r = scale (level - gap) on S, and zero elsewhere.

@@ -7,7 +7,7 @@
 !> stiffness), and the least and largest stiffness on a grid. In steady sliding, module `steady_symbols`
 !> divides A(q) by the complex modulus at the frequency of the wave.
 !>
-!> A new solid is one new function, `wave`, and its exact test; a second function, `cell`, if the solid
+!> A new solid is one new subroutine, `wave`, and its exact test; a function, `cell`, if the solid
 !> is to be used with a free boundary. Half-space (Johnson, Contact Mechanics, 1985; nu: Poisson ratio):
 !>
 !>     normal        A = (1 - nu)/q
