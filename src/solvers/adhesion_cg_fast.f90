@@ -42,7 +42,8 @@ module adhesion_cg_fast
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled
+   use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, &
+      resolved_traction
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_window, only : new_adhesion_window
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type, fresh, updated
@@ -50,6 +51,7 @@ module adhesion_cg_fast
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use fft_conv, only : columns_apply
+   use field_sums, only : largest_of_rows
    use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
@@ -61,6 +63,7 @@ module adhesion_cg_fast
    integer, parameter :: most_updates = 40      !! steps after which the traction is computed by a new product with B
    integer, parameter :: most_failures = 8      !! successive directions without a step
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
+   real(dp), parameter :: certain = 0.01_dp     !! round-off of a traction, over the tolerance, that decides nothing
    real(dp), parameter :: scaling_part = 0.02_dp   !! k over Q B at the Nyquist wave number
 
    !> The solver with its operators and work fields, kept from solve to solve. A variable of this type must not be
@@ -153,7 +156,7 @@ contains
       do
          call measure(self%work, now)
          if (now%residual <= now%limit) then
-            if (now%source /= fresh) then
+            if (.not. is_accurate(self, now)) then
                call refresh(self, now)
                cycle
             end if
@@ -203,10 +206,24 @@ contains
       call self%work%patch%evaluate_traction(now)
       now%source = fresh
       now%updates = 0
+      now%moved = 0.0_dp
    end subroutine refresh
 
-   !> The residual that decides whether a state is a solution: that of a fresh traction, in free mode with the true
-   !> operator.
+   !> Can it be concluded from the present traction that a state is a solution? That of a fresh product always
+   !> counts. The updates of the steps add round-off in proportion to their displacements. As long as this is far below
+   !> the tolerance, a fresh product would only confirm the traction, and is left out.
+   pure logical function is_accurate(self, now)
+      type(adhesion_fast_type), intent(in) :: self
+      type(adhesion_iteration_type), intent(in) :: now
+      real(dp) :: added
+
+      is_accurate = now%source == fresh
+      if (is_accurate) return
+      added = resolved_traction(now%problem, 0.0_dp, self%work%patch%nyquist, now%moved)
+      is_accurate = now%units%resolved + added <= certain*now%units%traction
+   end function is_accurate
+
+   !> The residual that decides whether a state is a solution: in free mode, that of the true operator.
    function verified_residual(self, now) result(residual)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -279,6 +296,7 @@ contains
       real(dp), intent(in) :: part
       real(dp), intent(in) :: form               !! Q s.B s
       real(dp), intent(in) :: stretch            !! factor of the step since its product was formed
+      real(dp) :: longest(self%work%patch%all_rows)
       integer :: j, n
 
       if (.not. part > 0.0_dp) then
@@ -287,7 +305,7 @@ contains
          now%has_last = .false.
          return
       end if
-      !$omp parallel do default(none) shared(self, now, part, stretch) private(j, n) &
+      !$omp parallel do default(none) shared(self, now, part, stretch, longest) private(j, n) &
       !$omp num_threads(self%work%patch%threads)
       do j = 1, self%work%patch%all_rows
          call self%work%patch%stiffness%backward_row(1, j, self%work%image(:, j))
@@ -295,9 +313,11 @@ contains
          now%traction(:, j) = now%traction(:, j) + part*now%problem%modulus*self%work%image(:, j)
          n = self%work%patch%inner(j)
          now%state(:, j) = now%state(:, j) + part*self%work%direction(:, j)
+         longest(j) = maxval(abs(self%work%direction(:, j)))
          now%state(1:n, j) = max(now%state(1:n, j), 0.0_dp)
       end do
       now%level = now%level + part*now%lift
+      now%moved = now%moved + part*(largest_of_rows(longest) + abs(now%lift))
       call keep_step(self%work, now, form)
       now%failures = 0
       now%caution = merge(now%caution + 1, max(now%caution - 1, 0), part < short)

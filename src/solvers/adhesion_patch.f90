@@ -42,6 +42,7 @@ module adhesion_patch
    type :: residual_units_type
       real(dp) :: length = 1.0_dp        !! z_0, or the rms height without adhesion, m
       real(dp) :: traction = 1.0_dp      !! gamma_0/z_0, or the largest traction without adhesion, Pa
+      real(dp) :: resolved = 0.0_dp      !! the least such unit that the round-off of a fresh traction allows, Pa
    end type residual_units_type
 
    !> The fields and numbers of a contact that is being solved.

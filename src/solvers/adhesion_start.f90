@@ -34,8 +34,8 @@ contains
       end if
       call self%evaluate_traction(contact)
       greatest = max(abs(contact%load), field_magnitude(contact%traction))
-      contact%units%traction = max(resolved_traction(contact%problem, greatest, self%nyquist, spread), &
-         traction_scale(contact%problem%potential, &
+      contact%units%resolved = resolved_traction(contact%problem, greatest, self%nyquist, spread)
+      contact%units%traction = max(contact%units%resolved, traction_scale(contact%problem%potential, &
          max(greatest, contact%problem%modulus*self%longest*deviation)))
    end subroutine begin_contact
 

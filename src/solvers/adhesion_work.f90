@@ -10,7 +10,7 @@ module adhesion_work
 
    public :: adhesion_iteration_type, adhesion_work_type
 
-   ! How the traction was computed. A state counts as a solution only with a fresh traction.
+   ! How the traction was computed.
    integer, parameter, public :: updated = 1    !! it was updated by the steps, and has accumulated round-off
    integer, parameter, public :: fresh = 2      !! it is a product with B
 
@@ -42,6 +42,7 @@ module adhesion_work
    type, extends(adhesion_contact_type) :: adhesion_iteration_type
       integer :: source = fresh                  !! of the traction
       integer :: updates = 0                     !! of the traction since it was fresh
+      real(dp) :: moved = 0.0_dp                 !! sum of the largest displacements of the steps since then, m
       integer :: failures = 0                    !! successive steps that did not lower the energy
       integer :: caution = 0                     !! number of quarterings of the lengths allowed, after failures
       real(dp) :: residual = 0.0_dp              !! natural residual of the present traction
