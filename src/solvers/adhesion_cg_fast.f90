@@ -60,10 +60,10 @@ module adhesion_cg_fast
 
    public :: adhesion_fast_type, new_adhesion_fast
 
-   integer, parameter :: most_updates = 40      !! steps after which the traction is computed by a new product with B
+   integer, parameter :: most_updates = 40      !! steps after which an inaccurate traction is computed again
    integer, parameter :: most_failures = 8      !! successive directions without a step
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
-   real(dp), parameter :: certain = 0.01_dp     !! round-off of a traction, over the tolerance, that decides nothing
+   real(dp), parameter :: negligible = 0.01_dp  !! round-off of a traction, over the tolerance of the residual
    real(dp), parameter :: scaling_part = 0.02_dp   !! k over Q B at the Nyquist wave number
 
    !> The solver with its operators and work fields, kept from solve to solve. A variable of this type must not be
@@ -176,7 +176,8 @@ contains
          call approach_minimum(self%work, now)
          call find_part(self, now, part, form, stretch)
          call update(self, now, part, form, stretch)
-         if (now%updates == most_updates .or. now%failures == 2) call refresh(self, now)
+         if (now%failures == 2 .or. (now%updates >= most_updates .and. .not. is_accurate(self, now))) &
+            call refresh(self, now)
       end do
       outcome%required = max(now%problem%tolerance, now%problem%accepted)
       if (outcome%reason /= reason_converged) call check_last_state(self, now, outcome)
@@ -209,9 +210,9 @@ contains
       now%moved = 0.0_dp
    end subroutine refresh
 
-   !> Can it be concluded from the present traction that a state is a solution? That of a fresh product always
-   !> counts. The updates of the steps add round-off in proportion to their displacements. As long as this is far below
-   !> the tolerance, a fresh product would only confirm the traction, and is left out.
+   !> Can it be concluded from the present traction that a state is a solution? A fresh product always counts. The
+   !> updates of the steps add round-off in proportion to their displacements. As long as this is far below the
+   !> tolerance, a fresh product would only confirm the traction, and is left out.
    pure logical function is_accurate(self, now)
       type(adhesion_fast_type), intent(in) :: self
       type(adhesion_iteration_type), intent(in) :: now
@@ -220,7 +221,7 @@ contains
       is_accurate = now%source == fresh
       if (is_accurate) return
       added = resolved_traction(now%problem, 0.0_dp, self%work%patch%nyquist, now%moved)
-      is_accurate = now%units%resolved + added <= certain*now%units%traction
+      is_accurate = now%units%resolved + added <= negligible*now%units%traction
    end function is_accurate
 
    !> The residual that decides whether a state is a solution: in free mode, that of the true operator.
