@@ -563,6 +563,27 @@ def test_picture(curve, tmp_path):
     assert (tmp_path / "curve.png").stat().st_size > 20000
 
 
+def test_a_picture_of_many_curves_has_a_colour_for_each_and_room_for_the_panels(curve):
+    """With 24 curves the palette would repeat, and the legend would leave no room for panels."""
+    times = 12 // curve.pressure.size
+    many = replace(curve, pressure=np.geomspace(1e4, 1e6, 12), losses={}, remarks=[], sources={},
+                   values={name: np.concatenate([array] * times)
+                           for name, array in curve.values.items()},
+                   theory={name: np.concatenate([array] * times)
+                           for name, array in curve.theory.items()})
+    figure = many.plot()
+    figure.canvas.draw()
+    names = {text.get_text() for text in figure.legends[0].get_texts()}
+    lines = [line for line in figure.axes[0].lines if line.get_label() in names]
+    curves = [line for line in lines if "Pa" in str(line.get_label())]
+    assert len({line.get_color() for line in curves}) == len(curves) == 24
+    heights = [panel.get_window_extent().height / figure.dpi for panel in figure.axes]
+    assert min(heights) > 1.5
+    legend = figure.legends[0].get_window_extent()
+    assert not any(panel.get_window_extent().overlaps(legend) for panel in figure.axes)
+    assert legend.y0 >= 0.0
+
+
 def scattered(curve):
     """Return a curve in which the patches differ so much that intervals of the area go below 0."""
     area = curve.values["contact_area"].copy()

@@ -14,7 +14,7 @@ from matplotlib.ticker import (
     StrMethodFormatter,
 )
 
-from .style import COLOURS, DOUBLE_COLUMN, print_style, shown_once, si_scale
+from .style import DOUBLE_COLUMN, distinct_colours, print_style, shown_once, si_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["plot_friction_curve"]
 
 _MARKERS = "o", "x"  # of points with warnings, and of those with states that are left out
+_LEGEND_COLUMNS = 4
+_MOST_KEYS = 4          # interval, theory and the two markers
+_LEGEND_ROW = 0.16      # height of a row of the legend, inches
 _FEW_DECADES = 1000.0   # ratio of the ends of an axis up to which 1, 2 and 5 are labelled
 
 
@@ -58,17 +61,18 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
                   ("contact_area", "area_persson", "contact area fraction")]
         if not float(curve.settings.get("coefficient", 0.0)):
             panels = panels[1:]  # without friction in the interface all of it is viscous
-        figure, places = plt.subplots(1, len(panels), figsize=(DOUBLE_COLUMN, 2.8),
-                                      layout="constrained")
         others = [name for name in order if name != along]
+        combinations = list(np.ndindex(*(axes[name].size for name in others)))
+        rows = -(-(len(combinations) + _MOST_KEYS) // _LEGEND_COLUMNS)
+        figure, places = plt.subplots(1, len(panels), layout="constrained",
+                                      figsize=(DOUBLE_COLUMN, 2.5 + _LEGEND_ROW * rows))
         floor = _floor(curve)
         flagged = [np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True)]
-        for number, at in enumerate(np.ndindex(*(axes[name].size for name in others))):
+        for at, colour in zip(combinations, distinct_colours(len(combinations)), strict=True):
             where = list(at)
             where.insert(place, slice(None))
             label = ", ".join(_words(name, float(axes[name][i]))
                               for name, i in zip(others, at, strict=True) if axes[name].size > 1)
-            colour = COLOURS[number % len(COLOURS)]
             for panel, (name, theory, _) in zip(places, panels, strict=True):
                 mean, low, high = (part[tuple(where)] for part in curve.mean(name))
                 if panel is places[-1]:
@@ -137,7 +141,7 @@ def _legend(figure: Figure, panel: Axes, flagged: list[NDArray[np.bool_]], dashe
         if some.any():
             panel.plot([], [], marker, color="k", fillstyle="none", markersize=7, label=text)
     figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", frameon=False,
-                  ncols=4)
+                  ncols=_LEGEND_COLUMNS)
 
 
 def _floor(curve: FrictionCurve) -> float:

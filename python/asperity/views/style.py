@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..results import Snapshot
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
-           "STICK", "axis_text", "check_picture", "label_of", "print_style", "save_picture",
-           "sentence", "shown_once", "si_scale", "typeset", "when"]
+           "STICK", "axis_text", "check_picture", "distinct_colours", "label_of", "print_style",
+           "save_picture", "sentence", "shown_once", "si_scale", "typeset", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -177,6 +177,20 @@ def axis_text(label: str, unit: str) -> str:
     """
     text = label[:1].lower() + label[1:]
     return f"{text} ({unit})" if unit else text
+
+
+def distinct_colours(count: int) -> list[str]:
+    """Return a colour for each of some curves.
+
+    If there are more curves than colours in the palette, they are equally spaced on a scale whose
+    lightness increases, so that no two curves have the same colour.
+    """
+    if count <= len(COLOURS):
+        return list(COLOURS[:count])
+    import matplotlib as mpl  # here, because commands that draw nothing must not wait for it
+
+    steps = np.linspace(0.0, 0.92, count)  # the lightest colours would not be seen on white paper
+    return [mpl.colors.to_hex(colour) for colour in mpl.colormaps["viridis"](steps)]
 
 
 def typeset(text: str) -> str:
