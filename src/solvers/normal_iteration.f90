@@ -53,15 +53,16 @@ module normal_iteration
    ! Steps by which the preconditioner extends the residual before and after the release of cells, for the numbers of cells
    ! of a grid from which they save time.
    real(dp), parameter :: large = 1.5e6_dp
-   real(dp), parameter :: sizes(4) = [2e4_dp, 1e5_dp, large, 3e7_dp]
+   real(dp), parameter :: sizes(6) = [2e4_dp, 1.7e5_dp, large, 4e6_dp, 1.2e7_dp, 3e7_dp]
+   integer, parameter :: steps_before(0:6) = [1, 1, 1, 2, 3, 3, 3]
+   integer, parameter :: steps_after(0:6) = [1, 2, 3, 3, 4, 5, 6]
+   integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
    real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
    integer, parameter :: least_class = 2          !! of oblong cells and line contacts
-   ! A contact that is a small part of a large grid needs no more steps than one on a smaller grid.
+   ! A contact that is a part of the grid needs no more steps than a dense one on a smaller grid.
+   real(dp), parameter :: light = 0.1_dp, dense = 0.5_dp   !! contact fractions between which the number of steps changes
    real(dp), parameter :: sparse = 0.03_dp        !! largest contact fraction of a sparse contact
    integer, parameter :: largest_class = 2        !! of a sparse contact
-   integer, parameter :: steps_before(0:4) = [1, 1, 1, 3, 3]
-   integer, parameter :: steps_after(0:4) = [1, 2, 3, 4, 6]
-   integer, parameter :: steps_alone(0:4) = [0, 0, 2, 2, 2]   !! if no cells are released
    integer, parameter :: least_across = 8         !! cells across a free strip for which the model fits
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
@@ -96,13 +97,14 @@ contains
       far_rim_pays = cells >= large
    end function far_rim_pays
 
-   !> The place of a contact in the lists of steps. The stencil fits oblong cells less well, and a line contact has many
-   !> cells along its only direction: they need more steps.
+   !> The place of a contact in the lists of steps. If the contact is less than half of the grid, the grid counts as one
+   !> with fewer cells. The stencil fits oblong cells less well, and a line contact has many cells along its only
+   !> direction: they need more steps.
    pure integer function size_class(grid, contact)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: contact                  !! fraction of the cells
 
-      size_class = count(grid%cells() >= sizes)
+      size_class = count(sqrt(min(max(contact, light)/dense, 1.0_dp))*grid%cells() >= sizes)
       if (contact <= sparse) size_class = min(size_class, largest_class)
       if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong .or. min(grid%nx, grid%ny) == 1) &
          size_class = max(size_class, least_class)
