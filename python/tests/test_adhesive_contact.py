@@ -372,3 +372,24 @@ def test_restart_gives_the_same_numbers(program, tmp_path, boundary, velocity):
         if name != "seconds":
             np.testing.assert_array_equal(one.history[name], other.history[name], err_msg=name)
     np.testing.assert_array_equal(one.snapshots[-1].pressure, other.snapshots[-1].pressure)
+
+
+@pytest.mark.parametrize("seed", [3, 134, 241, 251])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_the_pressure_belongs_to_the_gap_at_any_tolerance(seed, tolerance):
+    """Gaps within the tolerance count as 0, which changes the pressure of a stiff solid a lot."""
+    n, reach = 32, 5.0
+    energy = 1e-3 * reach**2
+    wave = np.hypot(*np.meshgrid(np.fft.fftfreq(n) * n, np.fft.fftfreq(n) * n))
+    random = np.random.default_rng(seed)
+    band = np.where((wave > 0.0) & (wave < 8.0), np.maximum(wave, 1.0) ** -1.8, 0.0)
+    height = np.fft.ifft2(np.fft.fft2(random.standard_normal((n, n))) * band).real
+    height /= height.std()
+    pressure = 0.3 * random.uniform(0.2, 2.0)
+    found = asperity.solve_adhesive(height, float(n), None, 1.0, energy=energy, range=reach,
+                                    pressure=pressure, tolerance=tolerance)
+    expected = pressure + np.fft.ifft2(np.pi / n * wave * np.fft.fft2(found.gap + height)).real
+    unit = energy / reach
+    assert np.abs(found.pressure - expected).max() <= 0.11 * tolerance * unit
+    gradient = expected + unit * np.exp(-found.gap / reach)
+    assert np.abs(np.minimum(found.gap / reach, gradient / unit)).max() <= tolerance

@@ -33,6 +33,7 @@
 !> state, the traction and psi. The true operator takes three fields of the patch. Transforms are then counted in those
 !> of the doubled grid.
 module adhesion_cg_fast
+   use adhesion_closing, only : close_narrow_gaps
    use adhesion_descent, only : approach_minimum
    use adhesion_method, only : adhesion_method_type
    use adhesion_model, only : new_adhesion_model
@@ -61,9 +62,11 @@ module adhesion_cg_fast
    public :: adhesion_fast_type, new_adhesion_fast
 
    integer, parameter :: most_updates = 40      !! steps after which an inaccurate traction is computed again
+   integer, parameter :: most_closings = 5     !! times that narrow gaps are closed before the end of a solve
    integer, parameter :: most_failures = 8      !! successive directions without a step
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
    real(dp), parameter :: negligible = 0.01_dp  !! round-off of a traction, over the tolerance of the residual
+   real(dp), parameter :: stricter = 0.3_dp     !! factor of the residual at which a solution is checked again
    real(dp), parameter :: scaling_part = 0.02_dp   !! k over Q B at the Nyquist wave number
 
    !> The solver with its operators and work fields, kept from solve to solve. A variable of this type must not be
@@ -145,6 +148,7 @@ contains
       type(adhesion_iteration_type), intent(inout) :: now
       type(solver_result_type), intent(inout) :: outcome
       real(dp) :: form, part, stretch
+      logical :: changed
 
       self%work%scaling = 0.0_dp
       if (stiffens(now%problem%potential)) &
@@ -156,15 +160,13 @@ contains
       do
          call measure(self%work, now)
          if (now%residual <= now%limit) then
-            if (.not. is_accurate(self, now)) then
-               call refresh(self, now)
-               cycle
-            end if
+            call complete_state(self, now, changed)
+            if (changed) cycle
             outcome%residual = verified_residual(self, now)
             if (outcome%residual <= now%problem%tolerance) outcome%reason = reason_converged
             if (outcome%reason == reason_converged) exit
             ! The true operator of a free grid finds a larger error: continue to a smaller residual.
-            now%limit = 0.3_dp*now%limit
+            now%limit = stricter*now%limit
          end if
          if (is_detached(self%work%patch, now, now%least)) outcome%reason = reason_detached
          if (now%failures > most_failures) outcome%reason = reason_stalled
@@ -209,6 +211,22 @@ contains
       now%updates = 0
       now%moved = 0.0_dp
    end subroutine refresh
+
+   !> Make the gap and the traction of a solution belong together as closely as the tolerance requires.
+   subroutine complete_state(self, now, changed)
+      type(adhesion_fast_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(inout) :: now
+      logical, intent(out) :: changed            !! the state must be measured again
+
+      changed = .not. is_accurate(self, now)
+      if (.not. changed .and. now%closings < most_closings) then
+         call close_narrow_gaps(self%work%patch, now, changed)
+         if (changed) now%closings = now%closings + 1
+         ! A smaller residual tells more clearly whether a cell with a narrow gap is closed.
+         if (changed) now%limit = stricter*now%limit
+      end if
+      if (changed) call refresh(self, now)
+   end subroutine complete_state
 
    !> Can it be concluded from the present traction that a state is a solution? A fresh product always counts. The
    !> updates of the steps add round-off in proportion to their displacements. As long as this is far below the

@@ -1,8 +1,8 @@
 !> The start of an adhesive contact: the state from which an iteration begins, and the units of its residual.
 module adhesion_start
+   use adhesion_closing, only : keep_gap_sum
    use adhesion_patch, only : adhesion_contact_type, adhesion_patch_type
    use adhesion_state, only : control_approach, control_pressure, resolved_traction, traction_scale
-   use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_precision, only : dp
    use field_sums, only : field_magnitude, field_mean, field_minimum, field_rms, field_sum
    implicit none
@@ -47,7 +47,7 @@ contains
       type(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
       real(dp), intent(in) :: round_off                         !! of the heights, m
-      real(dp) :: shift, narrow
+      real(dp) :: narrow
       integer :: j
 
       narrow = 0.0_dp
@@ -65,11 +65,7 @@ contains
       if (contact%problem%control /= control_approach) return
       contact%gap_sum = -self%cells*(contact%problem%target + contact%mean_height)
       if (field_sum(contact%state) > 0.0_dp) then
-         shift = sum_shift(contact%state, contact%state, 0.0_dp, contact%gap_sum, self%threads)
-         !$omp parallel do default(none) shared(contact, shift) private(j) num_threads(self%threads)
-         do j = 1, self%rows
-            contact%state(:, j) = stepped_gap(contact%state(:, j), 0.0_dp, 0.0_dp, shift)
-         end do
+         call keep_gap_sum(self, contact)
       else
          contact%state(:, :) = contact%gap_sum/self%cells
       end if

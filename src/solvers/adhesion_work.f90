@@ -43,6 +43,7 @@ module adhesion_work
       integer :: source = fresh                  !! of the traction
       integer :: updates = 0                     !! of the traction since it was fresh
       real(dp) :: moved = 0.0_dp                 !! sum of the largest displacements of the steps since then, m
+      integer :: closings = 0                    !! times that narrow gaps were closed
       integer :: failures = 0                    !! successive steps that did not lower the energy
       integer :: caution = 0                     !! number of quarterings of the lengths allowed, after failures
       real(dp) :: residual = 0.0_dp              !! natural residual of the present traction
