@@ -126,7 +126,7 @@ contains
                call refuse(''''//argument//''' must be the first word; its options follow it')
                done = .true.
             end if
-         else if (.not. allocated(command%path)) then
+         else if (.not. allocated(command%path) .and. command%verb /= 'version') then
             command%path = argument
             if (argument == '') call refuse(command%verb//': the name that follows it is empty')
          else

@@ -126,6 +126,7 @@ def test_help(program, verb):
         (["run"], "run needs an input"),
         (["check", "--outptu", "x", "a.nml"], "did you mean --output?"),
         (["run", "a.nml", "b.nml"], "'b.nml' is one argument too many"),
+        (["--version", "more"], "'more' is one argument too many"),
         (["run", "a.nml", "--output"], "--output needs a value"),
         (["run", "a.nml", "--threads", "0"], "must be an integer from 1 to 1024"),
         (["run", "a.nml", "--threads", "two"], "--threads two"),
