@@ -393,3 +393,22 @@ def test_the_pressure_belongs_to_the_gap_at_any_tolerance(seed, tolerance):
     assert np.abs(found.pressure - expected).max() <= 0.11 * tolerance * unit
     gradient = expected + unit * np.exp(-found.gap / reach)
     assert np.abs(np.minimum(found.gap / reach, gradient / unit)).max() <= tolerance
+
+
+def test_a_gauss_potential_lets_cells_open_at_a_given_displacement():
+    """Where it is stiff, the preconditioner must not keep cells closed that are pulled apart."""
+    n = 16
+    wave = np.hypot(*np.meshgrid(np.fft.fftfreq(n) * n, np.fft.fftfreq(n) * n))
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        band = np.where((wave > 0.0) & (wave < 4.0), np.maximum(wave, 1.0) ** -1.5, 0.0)
+        height = np.fft.ifft2(np.fft.fft2(random.standard_normal((n, n))) * band).real
+        height /= height.std()
+        full = height.max() - height.mean()
+        reach = 10 ** random.uniform(-1.0, 0.0)
+        given = {"potential": "gauss", "range": reach, "energy": random.uniform(0.3, 3) * reach**2}
+        near = asperity.solve_adhesive(height, float(n), None, 1.0, displacement=0.9 * full,
+                                       start="full_contact", **given)
+        found = asperity.solve_adhesive(height, float(n), None, 1.0, displacement=0.4 * full,
+                                        start=near, **given)
+        assert found.residual <= 1e-6

@@ -33,7 +33,7 @@
 !> state, the traction and psi. The true operator takes three fields of the patch. Transforms are then counted in those
 !> of the doubled grid.
 module adhesion_cg_fast
-   use adhesion_closing, only : close_narrow_gaps
+   use adhesion_closing, only : close_carried_gaps
    use adhesion_descent, only : approach_minimum
    use adhesion_method, only : adhesion_method_type
    use adhesion_model, only : new_adhesion_model
@@ -43,7 +43,7 @@ module adhesion_cg_fast
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, &
+   use adhesion_state, only : control_approach, reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, &
       resolved_traction
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_window, only : new_adhesion_window
@@ -66,6 +66,7 @@ module adhesion_cg_fast
    integer, parameter :: most_failures = 8      !! successive directions without a step
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
    real(dp), parameter :: negligible = 0.01_dp  !! round-off of a traction, over the tolerance of the residual
+   real(dp), parameter :: still = 0.01_dp       !! relative change of a residual that hardly changes
    real(dp), parameter :: stricter = 0.3_dp     !! factor of the residual at which a solution is checked again
    real(dp), parameter :: scaling_part = 0.02_dp   !! k over Q B at the Nyquist wave number
 
@@ -150,14 +151,12 @@ contains
       real(dp) :: form, part, stretch
       logical :: changed
 
-      self%work%scaling = 0.0_dp
-      if (stiffens(now%problem%potential)) &
-         self%work%scaling = scaling_part*now%problem%modulus*self%work%patch%nyquist
       self%work%direction = 0.0_dp
       self%work%residual = 0.0_dp
       now%limit = now%problem%tolerance
       outcome%reason = reason_limit
       do
+         call choose_scaling(self, now)
          call measure(self%work, now)
          if (now%residual <= now%limit) then
             call complete_state(self, now, changed)
@@ -185,6 +184,21 @@ contains
       if (outcome%reason /= reason_converged) call check_last_state(self, now, outcome)
       outcome%converged = outcome%reason == reason_converged
    end subroutine minimise
+
+   !> Choose whether the preconditioner is scaled, and keep the last residual. If the sum of the gaps is prescribed, the
+   !> mean is subtracted from z. Where the scaling makes z small, this may keep cells closed that have to open. The
+   !> preconditioner is therefore not scaled after an iteration that hardly reduced the residual.
+   subroutine choose_scaling(self, now)
+      type(adhesion_fast_type), intent(inout) :: self
+      type(adhesion_iteration_type), intent(inout) :: now
+      logical :: keeps_sum
+
+      keeps_sum = self%work%patch%periodic .and. now%problem%control == control_approach
+      self%work%scaling = 0.0_dp
+      if (stiffens(now%problem%potential) .and. .not. (keeps_sum .and. abs(now%residual - now%before) < still*now%before)) &
+         self%work%scaling = scaling_part*now%problem%modulus*self%work%patch%nyquist
+      now%before = now%residual
+   end subroutine choose_scaling
 
    !> Measure the last state of a loop that has not converged. It may be a solution nevertheless.
    subroutine check_last_state(self, now, outcome)
@@ -220,7 +234,7 @@ contains
 
       changed = .not. is_accurate(self, now)
       if (.not. changed .and. now%closings < most_closings) then
-         call close_narrow_gaps(self%work%patch, now, changed)
+         call close_carried_gaps(self%work%patch, now, changed)
          if (changed) now%closings = now%closings + 1
          ! A smaller residual tells more clearly whether a cell with a narrow gap is closed.
          if (changed) now%limit = stricter*now%limit

@@ -15,14 +15,14 @@ module adhesion_closing
    implicit none
    private
 
-   public :: close_narrow_gaps, keep_gap_sum
+   public :: close_carried_gaps, keep_gap_sum
 
    real(dp), parameter :: noticeable = 0.1_dp    !! change of a traction over the tolerance
 
 contains
 
    !> Close the narrow gaps of a periodic contact, if that changes the traction noticeably.
-   subroutine close_narrow_gaps(self, contact, closed)
+   subroutine close_carried_gaps(self, contact, closed)
       class(adhesion_patch_type), intent(in) :: self
       class(adhesion_contact_type), intent(inout) :: contact
       logical, intent(out) :: closed                   !! the traction must be computed again
@@ -44,7 +44,7 @@ contains
          where (is_narrow(contact, j)) contact%state(:, j) = 0.0_dp
       end do
       if (contact%problem%control == control_approach) call keep_gap_sum(self, contact)
-   end subroutine close_narrow_gaps
+   end subroutine close_carried_gaps
 
    !> Is the gap of a cell within the tolerance, but not zero, in a cell that the wall carries?
    pure function is_narrow(contact, j) result(narrow)

@@ -47,6 +47,7 @@ module adhesion_work
       integer :: failures = 0                    !! successive steps that did not lower the energy
       integer :: caution = 0                     !! number of quarterings of the lengths allowed, after failures
       real(dp) :: residual = 0.0_dp              !! natural residual of the present traction
+      real(dp) :: before = huge(1.0_dp)          !! the same in the iteration before
       real(dp) :: limit = 0.0_dp                 !! residual at which a solution is checked
       real(dp) :: least = 0.0_dp                 !! least gap, m
       real(dp) :: missing = 0.0_dp               !! prescribed force minus the sum of P, free mode, Pa
