@@ -21,7 +21,7 @@
 !> * If the force is prescribed in free mode, the level is an additional unknown, which moves with the mode psi (module
 !>   `adhesion_patch`). Its residual is the `missing` force, and its part of a step is the number `lift`.
 !> * Near contact the Gauss potential is stiffer than the solid. The preconditioner in the model is therefore scaled
-!>   from both sides by (1 + max(e'', 0)/k)^(-1/2), where k is 0.02 Q B at the Nyquist wave number.
+!>   from both sides by (1 + max(e'', 0)/k)^(-1/2), where k is 0.02 Q B at the Nyquist wave number (see `choose_scaling`).
 !>
 !> If the attraction is strong, the energy has several minima, and the solver finds the one near the start. The start is
 !> therefore part of the problem. Under a negative prescribed pressure there may be no minimum: if all gaps are so wide
@@ -34,7 +34,7 @@
 !> of the doubled grid.
 module adhesion_cg_fast
    use adhesion_closing, only : close_carried_gaps
-   use adhesion_descent, only : approach_minimum
+   use adhesion_descent, only : approach_minimum, keeps_sum
    use adhesion_method, only : adhesion_method_type
    use adhesion_model, only : new_adhesion_model
    use adhesion_patch, only : adhesion_contact_type, is_detached, new_adhesion_patch
@@ -43,7 +43,7 @@ module adhesion_cg_fast
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : control_approach, reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, &
+   use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, &
       resolved_traction
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_window, only : new_adhesion_window
@@ -187,15 +187,15 @@ contains
 
    !> Choose whether the preconditioner is scaled, and keep the last residual. If the sum of the gaps is prescribed, the
    !> mean is subtracted from z. Where the scaling makes z small, this may keep cells closed that have to open. The
-   !> preconditioner is therefore not scaled after an iteration that hardly reduced the residual.
+   !> preconditioner is therefore not scaled after an iteration in which the residual hardly changed.
    subroutine choose_scaling(self, now)
       type(adhesion_fast_type), intent(inout) :: self
       type(adhesion_iteration_type), intent(inout) :: now
-      logical :: keeps_sum
+      logical :: stands_still
 
-      keeps_sum = self%work%patch%periodic .and. now%problem%control == control_approach
+      stands_still = abs(now%residual - now%before) < still*now%before
       self%work%scaling = 0.0_dp
-      if (stiffens(now%problem%potential) .and. .not. (keeps_sum .and. abs(now%residual - now%before) < still*now%before)) &
+      if (stiffens(now%problem%potential) .and. .not. (keeps_sum(self%work, now) .and. stands_still)) &
          self%work%scaling = scaling_part*now%problem%modulus*self%work%patch%nyquist
       now%before = now%residual
    end subroutine choose_scaling

@@ -23,6 +23,7 @@
 !> the length of a step, too: with 24 instead of 8 a fifth fewer transforms would be needed, but on rough surfaces
 !> half of the solutions would be other minima than the one that a slow loading reaches.
 module adhesion_descent
+   use adhesion_closing, only : keep_gap_sum
    use adhesion_directions, only : find_direction
    use adhesion_potential, only : has_smooth_potential
    use adhesion_state, only : control_approach
@@ -38,7 +39,7 @@ module adhesion_descent
    implicit none
    private
 
-   public :: approach_minimum
+   public :: approach_minimum, keeps_sum
 
    integer, parameter :: most_iterations = 8          !! in the model, for a step
    real(dp), parameter :: goal = 0.1_dp               !! part of the residual at which a step ends
@@ -110,7 +111,7 @@ contains
    subroutine close_narrow_gaps(work, inner)
       type(adhesion_work_type), intent(inout) :: work
       type(adhesion_iteration_type), intent(inout) :: inner
-      real(dp) :: form, shift
+      real(dp) :: form
       logical :: any_closed
       integer :: j, n
 
@@ -128,13 +129,9 @@ contains
       end do
       if (.not. any_process(any_closed)) return
 
-      shift = 0.0_dp
-      if (keeps_sum(work, inner)) &
-         shift = sum_shift(inner%state, inner%state, 0.0_dp, inner%gap_sum, work%patch%threads)
-      !$omp parallel do default(none) shared(work, inner, shift) private(j, n) num_threads(work%patch%threads)
+      if (keeps_sum(work, inner)) call keep_gap_sum(work%patch, inner)
+      !$omp parallel do default(none) shared(work, inner) private(j) num_threads(work%patch%threads)
       do j = 1, work%patch%all_rows
-         n = work%patch%inner(j)
-         inner%state(1:n, j) = stepped_gap(inner%state(1:n, j), 0.0_dp, 0.0_dp, shift)
          work%change(:, j) = inner%state(:, j) - work%change(:, j)
          call work%model%put_row(j, work%change(:, j))
       end do
