@@ -1,8 +1,8 @@
 !> Directions of the fast method for adhesive contact (module `adhesion_cg_fast`): d = z + beta d with z = M r,
 !> where r is the measured residual.
 module adhesion_directions
-   use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
-   use adhesion_sweeps, only : direction_of_cells, z_of_cells
+   use adhesion_state, only : control_approach, control_pressure
+   use adhesion_sweeps, only : direction_of_cells, scale_cells, z_of_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
    use field_sums, only : largest_of_rows, row_product
@@ -70,7 +70,7 @@ contains
          if (self%scaling > 0.0_dp) then
             call self%model%inverse_row(j, self%exchange(:, j), z)
             associate (n => self%patch%inner(j))
-               z(1:n) = z(1:n)*diagonal_scaling(now%problem, now%state(1:n, j), self%scaling)
+               call scale_cells(self%curvature(1:n, j), self%scaling, z(1:n))
             end associate
          else
             call self%model%inverse_row(j, self%residual(:, j), z)

@@ -5,8 +5,8 @@
 module adhesion_residual
    use adhesion_patch, only : evaluate_gradient
    use adhesion_potential, only : adhesive_slopes
-   use adhesion_state, only : control_approach, control_pressure, diagonal_scaling
-   use adhesion_sweeps, only : measure_cells
+   use adhesion_state, only : control_approach, control_pressure
+   use adhesion_sweeps, only : measure_cells, scale_cells
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type
    use asperity_precision, only : dp
    use field_sums, only : largest_of_rows, least_of_rows
@@ -105,8 +105,7 @@ contains
       end do
       if (self%scaling > 0.0_dp) then
          self%exchange(:, j) = self%residual(:, j)
-         self%exchange(1:n, j) = self%exchange(1:n, j)*diagonal_scaling(now%problem, now%state(1:n, j), &
-            self%scaling)
+         call scale_cells(self%curvature(1:n, j), self%scaling, self%exchange(1:n, j))
          call self%model%put_row(j, self%exchange(:, j))
       else
          call self%model%put_row(j, self%residual(:, j))

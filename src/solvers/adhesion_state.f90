@@ -10,16 +10,15 @@
 !> Module `adhesion_patch` contains the differences between periodic and free grids, and module `adhesion_steps`
 !> chooses the length of a step.
 module adhesion_state
-   use adhesion_potential, only : adhesion_potential_type, adhesive_curvature, adhesive_slope, &
-      potential_none
+   use adhesion_potential, only : adhesion_potential_type, adhesive_slope, potential_none
    use contact_rule, only : is_closed
    use normal_state, only : control_approach, control_pressure
    use asperity_precision, only : dp
    implicit none
    private
 
-   public :: adhesion_problem_type, close_gaps, control_approach, control_pressure, diagonal_scaling, &
-      resolved_traction, traction_scale
+   public :: adhesion_problem_type, close_gaps, control_approach, control_pressure, resolved_traction, &
+      traction_scale
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
@@ -46,17 +45,6 @@ module adhesion_state
    end type adhesion_problem_type
 
 contains
-
-   !> The factor by which the preconditioner is scaled from both sides at a cell: (1 + max(e'', 0)/k)^(-1/2).
-   elemental function diagonal_scaling(problem, gap, stiffness) result(scaling)
-      type(adhesion_problem_type), intent(in) :: problem
-      real(dp), intent(in) :: gap                  !! m
-      real(dp), intent(in) :: stiffness            !! k, Pa/m
-      real(dp) :: scaling
-
-      scaling = 1.0_dp/sqrt(1.0_dp &
-         + max(adhesive_curvature(problem%potential, gap), 0.0_dp)/stiffness)
-   end function diagonal_scaling
 
    !> Set the gaps of a solution to exactly 0 in the cells in contact (module `contact_rule`).
    subroutine close_gaps(problem, length, scale, threads, gap, pressure)

@@ -10,7 +10,7 @@ module adhesion_sweeps
    implicit none
    private
 
-   public :: direction_of_cells, measure_cells, move_cells, z_of_cells
+   public :: direction_of_cells, measure_cells, move_cells, scale_cells, z_of_cells
 
 contains
 
@@ -36,6 +36,20 @@ contains
          residual(i) = merge(-gradient, 0.0_dp, max(gap(i), -gradient) > 0.0_dp)
       end do
    end subroutine measure_cells
+
+   !> Multiply values by the factor with which the preconditioner is scaled from both sides, (1 + max(e'', 0)/k)^(-1/2).
+   pure subroutine scale_cells(curvature, stiffness, values)
+      real(dp), intent(in), contiguous :: curvature(:)       !! e'', Pa/m
+      real(dp), intent(in) :: stiffness                      !! k, Pa/m
+      real(dp), intent(inout), contiguous :: values(:)
+      real(dp) :: per_stiffness
+      integer :: i
+
+      per_stiffness = 1.0_dp/stiffness
+      do i = 1, size(values)
+         values(i) = values(i)/sqrt(1.0_dp + max(curvature(i), 0.0_dp)*per_stiffness)
+      end do
+   end subroutine scale_cells
 
    !> Compute z = M r on the free cells and 0 on the others, with r.z and z.(old r).
    pure subroutine z_of_cells(factor, opens_only, image, state, residual, old, z, rz, old_rz)

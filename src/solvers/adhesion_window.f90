@@ -10,7 +10,8 @@
 !> n x n matrices are one such product. They cost little, since n is small, and no transform of the grid is needed.
 module adhesion_window
    use adhesion_potential, only : adhesive_slopes
-   use adhesion_state, only : adhesion_problem_type, diagonal_scaling
+   use adhesion_state, only : adhesion_problem_type
+   use adhesion_sweeps, only : scale_cells
    use asperity_precision, only : dp, pi
    use kernels, only : kernel_type
    use regular_grid, only : boundary_periodic, grid_type, new_grid
@@ -133,12 +134,17 @@ contains
       type(window_task_type), intent(in) :: task
       type(window_state_type), intent(in) :: now
       real(dp), intent(out) :: z(side, side)
-      real(dp) :: scaling(side, side)
+      real(dp) :: scaled(side, side)
+      integer :: j
 
-      scaling(:, :) = 1.0_dp/task%problem%modulus
-      if (task%scaling > 0.0_dp) scaling(:, :) = scaling*diagonal_scaling(task%problem, now%gap, task%scaling)**2
-      scaling(:, :) = sqrt(scaling)
-      z(:, :) = scaling*in_sines(self, scaling*now%residual, 1.0_dp/self%stiffness)
+      scaled(:, :) = now%residual
+      do j = 1, side
+         if (task%scaling > 0.0_dp) call scale_cells(now%curvature(:, j), task%scaling, scaled(:, j))
+      end do
+      z(:, :) = in_sines(self, scaled, 1.0_dp/(task%problem%modulus*self%stiffness))
+      do j = 1, side
+         if (task%scaling > 0.0_dp) call scale_cells(now%curvature(:, j), task%scaling, z(:, j))
+      end do
       z(:, :) = merge(z, 0.0_dp, max(now%gap, now%residual) > 0.0_dp)
       z(:, :) = max(z, merge(-huge(1.0_dp), 0.0_dp, now%gap > 0.0_dp))
    end subroutine precondition
