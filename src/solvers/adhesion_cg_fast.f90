@@ -64,6 +64,7 @@ module adhesion_cg_fast
    integer, parameter :: most_updates = 40      !! steps after which an inaccurate traction is computed again
    integer, parameter :: most_closings = 5     !! times that narrow gaps are closed before the end of a solve
    integer, parameter :: most_failures = 8      !! successive directions without a step
+   integer, parameter :: most_calm = 8          !! largest number of good steps before longer ones are tried again
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
    real(dp), parameter :: negligible = 0.01_dp  !! round-off of a traction, over the tolerance of the residual
    real(dp), parameter :: still = 0.01_dp       !! relative change of a residual that hardly changes
@@ -334,7 +335,7 @@ contains
 
       if (.not. part > 0.0_dp) then
          now%failures = now%failures + 1
-         now%caution = now%caution + 1
+         call lose_confidence(now)
          now%has_last = .false.
          return
       end if
@@ -353,10 +354,39 @@ contains
       now%moved = now%moved + part*(largest_of_rows(longest) + abs(now%lift))
       call keep_step(self%work, now, form)
       now%failures = 0
-      now%caution = merge(now%caution + 1, max(now%caution - 1, 0), part < short)
+      if (part < short) then
+         call lose_confidence(now)
+      else
+         call gain_confidence(now)
+      end if
       now%source = updated
       now%updates = now%updates + 1
    end subroutine update
+
+   !> Take shorter steps after one that failed or of which hardly anything could be taken.
+   subroutine lose_confidence(now)
+      type(adhesion_iteration_type), intent(inout) :: now
+
+      now%caution = now%caution + 1
+      now%setbacks = now%setbacks + 1
+      now%calm = 0
+   end subroutine lose_confidence
+
+   !> Try longer steps after good ones. Near the loss of stability the local model may be stable where the energy is
+   !> not, or the reverse, so that its long steps fail again and again. The more of them have failed, the more good steps
+   !> are therefore required before a longer one is tried.
+   subroutine gain_confidence(now)
+      type(adhesion_iteration_type), intent(inout) :: now
+
+      if (now%caution == 0) then
+         now%setbacks = 0
+         return
+      end if
+      now%calm = now%calm + 1
+      if (now%calm < min(now%setbacks, most_calm)) return
+      now%caution = now%caution - 1
+      now%calm = 0
+   end subroutine gain_confidence
 
    !> Transforms done so far. Those of the model count by their number of cells.
    function transforms(self) result(count)

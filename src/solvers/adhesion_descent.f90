@@ -49,8 +49,7 @@ module adhesion_descent
 contains
 
    !> Compute the step from the present gap towards a minimum of the model, in work%direction and now%lift. The gap has
-   !> been measured. After steps that failed, or of which hardly anything could be taken, the step is shorter, until as
-   !> many steps have succeeded.
+   !> been measured. After steps that failed, or of which hardly anything could be taken, the step is shorter for a while.
    subroutine approach_minimum(work, now)
       type(adhesion_work_type), intent(inout), target :: work
       type(adhesion_iteration_type), intent(inout) :: now
