@@ -26,9 +26,10 @@
 !> against v. It is relative to the largest of several scales: the rms of DX in the contact, that of A T, the offset
 !> of a spring that pulls the road, and `least_scale`.
 !>
-!> Memory in addition to the caller's fields, in fields of doubles: eleven work fields, two for the spectrum of the
-!> operator (four on a free grid), two for that of the preconditioner, and 3/4 for the symbols of the latter. The
-!> fallback takes four more from its first use on.
+!> Memory in addition to the caller's fields, in fields of doubles: two for the spectrum of the operator (four on a free
+!> grid), two for that of the preconditioner, and 3/4 for the symbols of the latter; and 18 fields that contain only the
+!> cells in contact, with rows as long as the longest one (module `contact_runs`). The fallback takes four more of these
+!> from its first use on.
 !>
 !> examples/friction_iterations and docs/benchmarks.md show how the number of iterations depends on the mesh. An
 !> iteration of 'fast' takes one and a half products of the operator if points slip, one if all stick, and one product
@@ -107,8 +108,6 @@ contains
       self%length = max(grid%lx, grid%ly)
       self%compliance = operator%symbols%self_compliance(with_mean=.not. self%periodic)
       if (self%compliance <= 0.0_dp) self%compliance = self%length     ! one cell has no modes
-      allocate (self%work%bound(grid%nx, 2, grid%rows()), self%work%tangent(grid%nx, 3, grid%rows()), &
-         self%work%old(grid%nx, 2, grid%rows()), source=0.0_dp)
       chosen = 'fast'
       if (present(method)) chosen = method
       select case (chosen)
@@ -160,6 +159,7 @@ contains
          if (problem%residual <= self%tolerance .or. .not. result%converged) exit
       end do
 
+      call problem%finish()
       result%stopped = self%method%stopped
       self%resolved_slip = idle_slip*result%required*problem%scale
       result%residual = problem%residual
@@ -178,7 +178,7 @@ contains
       type(friction_fields_type), intent(in) :: fields
       type(friction_problem_type), intent(out) :: problem
 
-      problem%friction_fields_type = fields
+      problem%fields = fields
       problem%work => self%work
       problem%law = law
       problem%nx = operator%nx

@@ -43,6 +43,7 @@ module friction_cg_fast
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, columns_form, convolution_type
    use friction_cg_gradient, only : friction_gradient_type
+   use friction_fields, only : fit_field
    use friction_directions, only : direction_row, direction_sums_type, total_of
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total
@@ -69,7 +70,7 @@ module friction_cg_fast
    type, extends(friction_method_type) :: friction_fast_type
       type(friction_gradient_type), private :: fallback
       type(friction_preconditioner_type), private :: preconditioner
-      real(dp), allocatable, private :: d(:, :, :)             !! [nx, 2, rows]
+      real(dp), allocatable, private :: d(:, :, :)             !! [width, 2, rows]
    contains
       procedure :: iterate
       procedure :: destroy
@@ -96,7 +97,6 @@ contains
       type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
       type(error_type), allocatable, intent(out) :: error
 
-      allocate (self%d(grid%nx, 2, grid%rows()), source=0.0_dp)
       call new_friction_preconditioner(self%preconditioner, grid, kernel, error)
    end subroutine new_friction_fast
 
@@ -110,6 +110,7 @@ contains
       type(friction_goal_type) :: some_steps
 
       self%stopped = .false.
+      call fit_field(self%d, problem%width, 2, problem%rows)
       call self%preconditioner%set_mean_stiffness(operator)
       do while (iterations < goal%most_iterations)
          call iterate_gradients(self, problem, operator, goal, iterations)
@@ -248,10 +249,9 @@ contains
       !$omp parallel do default(none) shared(self, problem, operator, beta, rows) &
       !$omp private(j) num_threads(problem%threads)
       do j = 1, problem%rows
-         call direction_row(problem%compliance, beta, self%preconditioner%shift, problem%slip(:, :, j), &
+         call direction_row(problem%compliance, beta, self%preconditioner%shift, problem%work%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%preconditioner%z(:, :, j), self%d(:, :, j), rows(j))
-         call operator%forward_row(1, j, self%d(:, 1, j))
-         call operator%forward_row(2, j, self%d(:, 2, j))
+         call problem%spread_to_transform(operator, self%d(:, :, j), j)
       end do
       sums = total_of(rows)
       now%slope = sums%slope

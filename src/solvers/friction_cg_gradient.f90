@@ -11,6 +11,7 @@ module friction_cg_gradient
    use asperity_precision, only : dp
    use fft_conv, only : convolution_type
    use field_sums, only : row_totals
+   use friction_fields, only : fit_field
    use friction_law, only : contact_open, contact_stick
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
@@ -23,8 +24,8 @@ module friction_cg_gradient
 
    !> The method with its work fields, which are made when it is first used.
    type, extends(friction_method_type) :: friction_gradient_type
-      real(dp), allocatable, private :: slip(:, :, :)    !! [nx, 2, rows] r along the slope
-      real(dp), allocatable, private :: step(:, :, :)    !! [nx, 2, rows] s
+      real(dp), allocatable, private :: slip(:, :, :)    !! [width, 2, rows] r along the slope
+      real(dp), allocatable, private :: step(:, :, :)    !! [width, 2, rows] s
    contains
       procedure :: iterate
    end type friction_gradient_type
@@ -41,9 +42,8 @@ contains
       real(dp) :: alpha, first, first_alpha
       logical :: returned
 
-      if (.not. allocated(self%step)) &
-         allocate (self%slip(problem%nx, 2, problem%rows), &
-            self%step(problem%nx, 2, problem%rows), source=0.0_dp)
+      call fit_field(self%slip, problem%width, 2, problem%rows)
+      call fit_field(self%step, problem%width, 2, problem%rows)
       self%stopped = .false.
       first = problem%residual
       first_alpha = 1.0_dp/(problem%compliance*sqrt(real(max(problem%cells, 1), dp)))
@@ -72,15 +72,15 @@ contains
       !$omp parallel do default(none) shared(self, problem, alpha) &
       !$omp private(i, j, slope, r, s, t) num_threads(problem%threads)
       do j = 1, problem%rows
-         do i = 1, problem%nx
-            if (problem%contact(i, j) == contact_open) cycle
+         do i = 1, problem%width
+            if (problem%work%contact(i, j) == contact_open) cycle
             slope = problem%slope_at(i, j)
-            r = problem%law%slip_along_slope(slope, problem%slip(i, :, j))
-            t = problem%traction(i, :, j) + alpha*r
+            r = problem%law%slip_along_slope(slope, problem%work%slip(i, :, j))
+            t = problem%work%traction(i, :, j) + alpha*r
             call problem%place_on_bound(i, j, 1.0_dp, t, s)
             self%slip(i, :, j) = r
-            self%step(i, :, j) = t - problem%traction(i, :, j)
-            problem%contact(i, j) = contact_stick
+            self%step(i, :, j) = t - problem%work%traction(i, :, j)
+            problem%work%contact(i, j) = contact_stick
          end do
       end do
    end subroutine form_step
@@ -99,10 +99,10 @@ contains
       !$omp parallel do default(none) shared(self, problem, rows) private(i, j, s, y) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         do i = 1, problem%nx
-            if (problem%contact(i, j) == contact_open) cycle
+         do i = 1, problem%width
+            if (problem%work%contact(i, j) == contact_open) cycle
             y = self%slip(i, :, j) &
-               - problem%law%slip_along_slope(problem%slope_at(i, j), problem%slip(i, :, j))
+               - problem%law%slip_along_slope(problem%slope_at(i, j), problem%work%slip(i, :, j))
             s = self%step(i, :, j)
             rows(1, j) = rows(1, j) + s(1)**2 + s(2)**2
             rows(2, j) = rows(2, j) + s(1)*y(1) + s(2)*y(2)

@@ -17,6 +17,7 @@ module friction_cg_thesis
    use asperity_precision, only : dp
    use fft_conv, only : columns_form, convolution_type
    use field_sums, only : row_totals
+   use friction_fields, only : fit_field
    use friction_law, only : contact_open, contact_slip
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move
@@ -31,9 +32,9 @@ module friction_cg_thesis
 
    !> The method with its work fields, which are made when it is first used.
    type, extends(friction_method_type) :: friction_thesis_type
-      real(dp), allocatable, private :: gradient(:, :, :)    !! [nx, 2, rows] g
-      real(dp), allocatable, private :: direction(:, :, :)   !! [nx, 2, rows] d
-      real(dp), allocatable, private :: tangent(:, :, :)     !! [nx, 2, rows] t
+      real(dp), allocatable, private :: gradient(:, :, :)    !! [width, 2, rows] g
+      real(dp), allocatable, private :: direction(:, :, :)   !! [width, 2, rows] d
+      real(dp), allocatable, private :: tangent(:, :, :)     !! [width, 2, rows] t
    contains
       procedure :: iterate
    end type friction_thesis_type
@@ -50,10 +51,9 @@ contains
       real(dp) :: beta, ascent, bend, form, alpha
       logical :: returned
 
-      if (.not. allocated(self%gradient)) then
-         allocate (self%gradient(problem%nx, 2, problem%rows), source=0.0_dp)
-         allocate (self%direction, self%tangent, source=self%gradient)
-      end if
+      call fit_field(self%gradient, problem%width, 2, problem%rows)
+      call fit_field(self%direction, problem%width, 2, problem%rows)
+      call fit_field(self%tangent, problem%width, 2, problem%rows)
       self%stopped = .false.
       beta = 0.0_dp
       do while (iterations < goal%most_iterations)
@@ -90,17 +90,17 @@ contains
       !$omp parallel do default(none) shared(self, problem, operator, beta, rows) &
       !$omp private(i, j, d, r, g, v, t, first, second) num_threads(problem%threads)
       do j = 1, problem%rows
-         do i = 1, problem%nx
+         do i = 1, problem%width
             g = 0.0_dp
             v = 0.0_dp
             t = 0.0_dp
-            if (problem%contact(i, j) /= contact_open) then
+            if (problem%work%contact(i, j) /= contact_open) then
                call perpendicular(problem, i, j, d, r, g)
                v = g
                if (abs(beta) > 0.0_dp) v = g + beta*self%direction(i, :, j)
                t = v
-               if (problem%contact(i, j) == contact_slip) then
-                  call problem%law%bound_variation(problem%pressure(i, j), problem%slope_at(i, j), d, v, &
+               if (problem%work%contact(i, j) == contact_slip) then
+                  call problem%law%bound_variation(problem%pressure_at(i, j), problem%slope_at(i, j), d, v, &
                      first, second)
                   t = v + first*d
                   rows(2, j) = rows(2, j) + dot_product(second*d + 2.0_dp*first*v, r)
@@ -111,8 +111,7 @@ contains
             self%direction(i, :, j) = v
             self%tangent(i, :, j) = t
          end do
-         call operator%forward_row(1, j, self%tangent(:, 1, j))
-         call operator%forward_row(2, j, self%tangent(:, 2, j))
+         call problem%spread_to_transform(operator, self%tangent(:, :, j), j)
       end do
       totals = row_totals(rows)
       ascent = totals(1)
@@ -132,8 +131,8 @@ contains
       !$omp parallel do default(none) shared(self, problem, rows) private(i, j, d, r, g, y, t) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         do i = 1, problem%nx
-            if (problem%contact(i, j) == contact_open) cycle
+         do i = 1, problem%width
+            if (problem%work%contact(i, j) == contact_open) cycle
             call perpendicular(problem, i, j, d, r, g)
             y = g - self%gradient(i, :, j)
             t = self%tangent(i, :, j)
@@ -158,10 +157,10 @@ contains
       real(dp) :: slope(2), dd
 
       slope = problem%slope_at(i, j)
-      d = problem%traction(i, :, j) - problem%law%normal_traction(problem%pressure(i, j), slope)
-      r = problem%law%slip_along_slope(slope, problem%slip(i, :, j))
+      d = problem%work%traction(i, :, j) - problem%law%normal_traction(problem%pressure_at(i, j), slope)
+      r = problem%law%slip_along_slope(slope, problem%work%slip(i, :, j))
       g = r
-      if (problem%contact(i, j) /= contact_slip) return
+      if (problem%work%contact(i, j) /= contact_slip) return
       dd = d(1)**2 + d(2)**2
       g = 0.0_dp
       if (dd > 0.0_dp) g = r - (r(1)*d(1) + r(2)*d(2))/dd*d

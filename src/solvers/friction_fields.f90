@@ -1,12 +1,14 @@
-!> The fields of the tangential problem: those of the caller, and the work fields that the methods share.
+!> The fields of the tangential problem: those of the caller, and those of its solution, which the methods share.
 !>
-!> Vector fields have the shape [nx, 2, rows], so that a row of both components is one contiguous argument.
+!> The vector fields of the caller have the shape [nx, 2, rows], and those of the solution [width, 2, rows], so that a
+!> row of both components is one contiguous argument.
 module friction_fields
+   use contact_runs, only : contact_runs_type
    use asperity_precision, only : dp, int8
    implicit none
    private
 
-   public :: friction_fields_type, friction_work_type
+   public :: fit_field, friction_fields_type, friction_work_type
 
    !> The fields of the caller.
    type :: friction_fields_type
@@ -32,11 +34,55 @@ module friction_fields
       integer(int8), pointer, contiguous :: contact(:, :) => null()
    end type friction_fields_type
 
-   !> Fields of a solution in addition to the caller's. Module `friction_rows` describes their contents.
+   !> The fields of a solution. They contain the cells in contact alone (module `contact_runs`), and zeros behind them;
+   !> `width` is the number of cells in a row. Module `friction_rows` describes their contents.
    type :: friction_work_type
-      real(dp), allocatable :: bound(:, :, :)      !! [nx, 2, rows] F, Pa, and N_z of the road
-      real(dp), allocatable :: tangent(:, :, :)    !! [nx, 3, rows] direction of slip and weight
-      real(dp), allocatable :: old(:, :, :)        !! [nx, 2, rows] T before the last move, Pa
+      type(contact_runs_type) :: runs
+      real(dp), allocatable :: site(:, :, :)       !! [width, 5, rows] P, slopes and bound
+      real(dp), allocatable :: share(:, :)         !! [width, rows] the caller's, if there are shares
+      real(dp), allocatable :: traction(:, :, :)   !! [width, 2, rows] T, Pa
+      real(dp), allocatable :: old(:, :, :)        !! [width, 2, rows] T before the last move, Pa
+      real(dp), allocatable :: slip(:, :, :)       !! [width, 2, rows] r, m
+      real(dp), allocatable :: tangent(:, :, :)    !! [width, 3, rows] direction of slip and weight
+      integer(int8), allocatable :: contact(:, :)  !! [width, rows] state
+   contains
+      procedure :: fit
    end type friction_work_type
+
+contains
+
+   !> Give the fields the width of the runs.
+   subroutine fit(self, rows, has_shares)
+      class(friction_work_type), intent(inout) :: self
+      integer, intent(in) :: rows
+      logical, intent(in) :: has_shares
+
+      associate (width => self%runs%width)
+         call fit_field(self%site, width, 5, rows)
+         call fit_field(self%traction, width, 2, rows)
+         call fit_field(self%old, width, 2, rows)
+         call fit_field(self%slip, width, 2, rows)
+         call fit_field(self%tangent, width, 3, rows)
+         if (allocated(self%contact)) then
+            if (size(self%contact, 1) /= width) deallocate (self%contact)
+         end if
+         if (.not. allocated(self%contact)) allocate (self%contact(width, rows))
+         if (allocated(self%share)) then
+            if (size(self%share, 1) /= width .or. .not. has_shares) deallocate (self%share)
+         end if
+         if (has_shares .and. .not. allocated(self%share)) allocate (self%share(width, rows))
+      end associate
+   end subroutine fit
+
+   !> Give a field a width. If this changes, its values become 0.
+   subroutine fit_field(field, width, columns, rows)
+      real(dp), allocatable, intent(inout) :: field(:, :, :)
+      integer, intent(in) :: width, columns, rows
+
+      if (allocated(field)) then
+         if (size(field, 1) /= width) deallocate (field)
+      end if
+      if (.not. allocated(field)) allocate (field(width, columns, rows), source=0.0_dp)
+   end subroutine fit_field
 
 end module friction_fields

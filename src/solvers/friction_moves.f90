@@ -3,7 +3,7 @@ module friction_moves
    use asperity_precision, only : dp, int8
    use fft_conv, only : convolution_type
    use friction_problem, only : friction_problem_type
-   use friction_rows, only : move_sums_type, move_type, returned_row, site_columns, stepped_row, total_of
+   use friction_rows, only : move_sums_type, move_type, returned_row, stepped_row, total_of
    implicit none
    private
 
@@ -21,7 +21,7 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
-      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
+      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [width, 2, rows] d, Pa
       logical, intent(in) :: again                   !! start again from the T before the last move
       logical, intent(in) :: transform               !! transform the rows of T' in the same pass
       logical, intent(out) :: returned               !! some points were returned to their bounds
@@ -40,7 +40,7 @@ contains
       type(friction_problem_type), intent(inout) :: problem
       type(convolution_type), intent(inout) :: operator
       real(dp), intent(in) :: step
-      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [nx, 2, rows] d, Pa
+      real(dp), intent(in), contiguous :: direction(:, :, :)     !! [width, 2, rows] d, Pa
       logical, intent(in) :: again                   !! from the T before the last move
       logical, intent(out) :: returned               !! some points were returned to their bounds
       type(move_type) :: how
@@ -141,18 +141,18 @@ contains
    subroutine move_row(problem, how, d, j, sums)
       type(friction_problem_type), intent(inout) :: problem
       type(move_type), intent(in) :: how
-      real(dp), intent(in) :: d(problem%nx, 2)
+      real(dp), intent(in) :: d(problem%width, 2)
       integer, intent(in) :: j
       type(move_sums_type), intent(out) :: sums
-      real(dp) :: site(problem%nx, site_columns), state(problem%nx), slips(problem%nx)
+      real(dp) :: state(problem%width), slips(problem%width)
 
-      call problem%gather_site(j, site)
-      state = problem%contact(:, j)
-      call stepped_row(how, d, problem%work%tangent(:, :, j), state, problem%traction(:, :, j), &
-         problem%work%old(:, :, j), slips)
-      call returned_row(problem%constants, how%uniform, site, slips, problem%work%old(:, :, j), &
-         problem%traction(:, :, j), state, sums)
-      problem%contact(:, j) = int(state, int8)
+      associate (work => problem%work)
+         state(:) = work%contact(:, j)
+         call stepped_row(how, d, work%tangent(:, :, j), state, work%traction(:, :, j), work%old(:, :, j), slips)
+         call returned_row(problem%constants, how%uniform, work%site(:, :, j), slips, work%old(:, :, j), &
+            work%traction(:, :, j), state, sums)
+         work%contact(:, j) = int(state, int8)
+      end associate
    end subroutine move_row
 
    !> Pseudo-inverse of the symmetric semidefinite matrix (xx, xy; xy, yy). Eigenvalues that are too small are

@@ -31,6 +31,7 @@ module friction_preconditioner
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
    use fft_conv, only : columns_apply, convolution_type, new_inverse_convolution
+   use friction_fields, only : fit_field
    use friction_directions, only : scaled_row, total_of, uniform_type, unscaled_row, z_sums_type
    use friction_moves, only : pseudo_inverse
    use friction_problem, only : friction_problem_type
@@ -48,7 +49,7 @@ module friction_preconditioner
       type(convolution_type) :: inverse                  !! M
       real(dp), private :: half_wave = 0.0_dp            !! mean compliance if the solid has none, m
       logical, private :: periodic = .true.
-      real(dp), allocatable :: z(:, :, :)                !! [nx, 2, rows]
+      real(dp), allocatable :: z(:, :, :)                !! [width, 2, rows]
       real(dp) :: shift(2) = 0.0_dp                      !! w Z shift is still to be added to z
       real(dp) :: gz = 0.0_dp                            !! g.z, with the shift
       real(dp) :: cross = 0.0_dp                         !! g.z_old
@@ -75,7 +76,6 @@ contains
       periodic%boundary = boundary_periodic
       block = kernel
       block%mean_mode = self%half_wave
-      allocate (self%z(grid%nx, 2, grid%rows()), source=0.0_dp)
       call new_inverse_convolution(self%inverse, periodic, block, error)
    end subroutine new_friction_preconditioner
 
@@ -101,6 +101,7 @@ contains
       real(dp) :: inverse(2, 2), coupling(2, 2)
 
       allocate (rows(problem%rows))
+      call fit_field(self%z, problem%width, 2, problem%rows)
       call mean_mode(problem, inverse, coupling)
       uniform%traction = matmul(inverse, problem%sums%residual)
       uniform%displacement = matmul(coupling, uniform%traction)
@@ -129,30 +130,30 @@ contains
       type(uniform_type), intent(in) :: uniform
       logical, intent(in) :: with_inverse          !! with M
       type(z_sums_type), intent(inout) :: rows(:)
-      real(dp) :: g(problem%nx, 2)
-      integer :: j
+      real(dp) :: g(problem%width, 2), whole(problem%nx)
+      integer :: c, j
 
       !$omp parallel do default(none) shared(self, problem, uniform, with_inverse, rows) private(j, g) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         call scaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         call scaled_row(problem%compliance, uniform, problem%work%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%z(:, :, j), g, rows(j)%cross)
          if (with_inverse) then
-            call self%inverse%forward_row(1, j, g(:, 1))
-            call self%inverse%forward_row(2, j, g(:, 2))
+            call problem%spread_to_transform(self%inverse, g, j)
          else
             self%z(:, :, j) = g/problem%compliance
          end if
       end do
       if (with_inverse) call self%inverse%columns(columns_apply)
-      !$omp parallel do default(none) shared(self, problem, uniform, with_inverse, rows) private(j) &
+      !$omp parallel do default(none) shared(self, problem, uniform, with_inverse, rows) private(c, j, whole) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
-         if (with_inverse) then
-            call self%inverse%backward_row(1, j, self%z(:, 1, j))
-            call self%inverse%backward_row(2, j, self%z(:, 2, j))
-         end if
-         call unscaled_row(problem%compliance, uniform, problem%slip(:, :, j), &
+         do c = 1, 2
+            if (.not. with_inverse) exit
+            call self%inverse%backward_row(c, j, whole)
+            call problem%work%runs%gather(j, whole, self%z(:, c, j))
+         end do
+         call unscaled_row(problem%compliance, uniform, problem%work%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%z(:, :, j), rows(j))
       end do
    end subroutine precondition_rows

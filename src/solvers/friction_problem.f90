@@ -18,16 +18,20 @@
 !> If the total of T is prescribed, the position c of the road is unknown, too: r = DX + c - A (T + T_h).
 !> Module `road_spring` gives c as a function of the total.
 !>
+!> The fields of the solution contain only the cells in contact (module `contact_runs`). A row is spread over the whole
+!> row of the grid before its transform, and gathered behind it. r is also needed outside the contact, and is therefore
+!> kept in the caller's field, too; `finish` returns T and the states to the caller.
+!>
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
 !> formed by row and added up in order, so that the results do not depend on the number of threads or processes.
 module friction_problem
    use asperity_precision, only : dp, int8
+   use contact_runs, only : find_runs
    use fft_conv, only : columns_apply, convolution_type
    use friction_fields, only : friction_fields_type, friction_work_type
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, unbounded
    use field_sums, only : row_total
-   use friction_rows, only : measure_sums_type, measured_row, row_constants_type, site_columns, &
-      tangent_row, total_of
+   use friction_rows, only : measure_sums_type, measured_row, row_constants_type, tangent_row, total_of
    use road_spring, only : road_spring_type
    implicit none
    private
@@ -41,9 +45,11 @@ module friction_problem
    real(dp), parameter :: stiffest = 1.0e15_dp            !! curvature of a bound, in units of a_0
 
    !> The problem and the state of its solution.
-   type, extends(friction_fields_type) :: friction_problem_type
+   type :: friction_problem_type
+      type(friction_fields_type) :: fields   !! of the caller
       type(friction_law_type) :: law
-      integer :: nx = 0
+      integer :: nx = 0                      !! cells of a row of the grid
+      integer :: width = 0                   !! cells of a row of the solution
       integer :: rows = 0                    !! of this process
       integer :: threads = 1
       real(dp) :: compliance = 0.0_dp        !! a_0: displacement of a cell under its own unit traction
@@ -70,10 +76,12 @@ module friction_problem
       procedure :: start
       procedure :: slope_at
       procedure :: place_on_bound
-      procedure :: gather_site
+      procedure :: pressure_at
+      procedure :: finish
       procedure :: update_slip
       procedure :: refresh_slip
       procedure :: advance_slip
+      procedure :: spread_to_transform
       procedure :: transform_row
       procedure :: transform_tractions
       procedure :: solved
@@ -82,8 +90,8 @@ module friction_problem
 
 contains
 
-   !> Project the first T: points that slipped in the step before are placed on their bound, and others within it.
-   !> Then compute the slip of this T and measure it.
+   !> Gather the cells in contact, and project the first T: points that slipped in the step before are placed on their
+   !> bound, and others within it. Then compute the slip of this T and measure it.
    subroutine start(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
@@ -95,60 +103,122 @@ contains
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope_effect .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, deepest_inside=deepest_inside)
+      call find_contact(self)
       !$omp parallel do default(none) shared(self, operator, sizes, cells, foreseen) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
+         call gather_row(self, j)
          call start_row(self, j, cells(j), foreseen(j), sizes(j))
          call self%transform_row(operator, j)
       end do
       self%cells = row_total(cells)
       self%foreseen = row_total(foreseen)
       self%change = 0.0_dp
-      if (row_total(sizes) > 0.0_dp .or. associated(self%past)) then
+      if (row_total(sizes) > 0.0_dp .or. associated(self%fields%past)) then
          call self%update_slip(operator)
       else
          call start_from_rest(self)
       end if
    end subroutine start
 
-   !> Compute the bound of a row and its first T.
+   !> Find the cells in contact, and give the fields of the solution their number.
+   subroutine find_contact(self)
+      type(friction_problem_type), intent(inout) :: self
+      integer :: j
+
+      !$omp parallel do default(none) shared(self) private(j) num_threads(self%threads)
+      do j = 1, self%rows
+         call find_contact_of_row(self%law, self%fields, j)
+      end do
+      call find_runs(self%work%runs, self%fields%contact, self%threads)
+      call self%work%fit(self%rows, associated(self%fields%share))
+      self%width = self%work%runs%width
+   end subroutine find_contact
+
+   !> Mark the cells of a row as open that carry no traction.
+   subroutine find_contact_of_row(law, fields, j)
+      type(friction_law_type), intent(in) :: law
+      type(friction_fields_type), intent(in) :: fields     !! its target `contact` is changed
+      integer, intent(in) :: j
+
+      if (associated(fields%share)) then
+         fields%contact(:, j) = merge(max(fields%contact(:, j), contact_stick), contact_open, fields%share(:, j) > 0.0_dp)
+      else if (law%adhesive_pressure <= 0.0_dp) then
+         fields%contact(:, j) = merge(fields%contact(:, j), contact_open, fields%pressure(:, j) > 0.0_dp)
+      end if
+   end subroutine find_contact_of_row
+
+   !> Gather the caller's fields of a row, and compute its bound.
+   subroutine gather_row(self, j)
+      type(friction_problem_type), intent(inout) :: self
+      integer, intent(in) :: j
+      integer :: c
+
+      associate (fields => self%fields, work => self%work, runs => self%work%runs)
+         call runs%gather(j, fields%contact(:, j), work%contact(:, j))
+         call runs%gather(j, fields%pressure(:, j), work%site(:, 1, j))
+         if (self%law%slope_effect) then
+            call runs%gather(j, fields%slope_x(:, j), work%site(:, 2, j))
+            call runs%gather(j, fields%slope_y(:, j), work%site(:, 3, j))
+         else
+            work%site(:, 2:3, j) = 0.0_dp
+         end if
+         call self%law%bound_row(self%width, work%site(:, 1, j), work%site(:, 2, j), work%site(:, 3, j), &
+            work%site(:, 4:5, j))
+         if (associated(fields%share)) then
+            call runs%gather(j, fields%share(:, j), work%share(:, j))
+            work%site(:, 4, j) = work%site(:, 4, j)*work%share(:, j)
+         end if
+         do c = 1, 2
+            call runs%gather(j, fields%traction(:, c, j), work%traction(:, c, j))
+            if (self%fields%slip_unit > 0.0_dp) call runs%gather(j, fields%slip(:, c, j), work%slip(:, c, j))
+         end do
+      end associate
+   end subroutine gather_row
+
+   !> Project the first T of a row.
    subroutine start_row(self, j, cells, foreseen, size)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
       integer, intent(out) :: foreseen             !! cells in contact that start along the slip that is expected
       real(dp), intent(out) :: size                !! |T|^2, Pa^2
-      real(dp) :: limit, s, site(self%nx, site_columns), t(2)
+      real(dp) :: limit, s, t(2)
       integer :: i
 
-      call self%gather_site(j, site)
-      call self%law%bound_row(self%nx, site(:, 1), site(:, 2), site(:, 3), self%work%bound(:, :, j))
-      if (associated(self%share)) then
-         self%work%bound(:, 1, j) = self%work%bound(:, 1, j)*self%share(:, j)
-         self%contact(:, j) = merge(max(self%contact(:, j), contact_stick), contact_open, &
-            self%share(:, j) > 0.0_dp)
-      else if (self%law%adhesive_pressure <= 0.0_dp) then
-         self%contact(:, j) = merge(self%contact(:, j), contact_open, self%pressure(:, j) > 0.0_dp)
-      end if
       cells = 0
       foreseen = 0
       size = 0.0_dp
-      do i = 1, self%nx
+      do i = 1, self%width
          t = 0.0_dp
-         if (self%contact(i, j) /= contact_open) then
-            t = self%traction(i, :, j)
+         if (self%work%contact(i, j) /= contact_open) then
+            t = self%work%traction(i, :, j)
             ! Slipping points are returned to their bound from both sides, others only from outside.
-            limit = merge(deepest_inside, 1.0_dp, self%contact(i, j) == contact_slip)
-            if (self%slip_unit > 0.0_dp) call start_along_slip(self, i, j, t, limit, foreseen)
+            limit = merge(deepest_inside, 1.0_dp, self%work%contact(i, j) == contact_slip)
+            if (self%fields%slip_unit > 0.0_dp) call start_along_slip(self, i, j, t, limit, foreseen)
             call self%place_on_bound(i, j, limit, t, s)
-            self%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
+            self%work%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
             cells = cells + 1
             size = size + (t(1)**2 + t(2)**2)
          end if
-         self%traction(i, :, j) = t
+         self%work%traction(i, :, j) = t
          self%work%old(i, :, j) = t
       end do
    end subroutine start_row
+
+   !> Return T and the states to the caller.
+   subroutine finish(self)
+      class(friction_problem_type), intent(in) :: self
+      integer :: c, j
+
+      !$omp parallel do default(none) shared(self) private(c, j) num_threads(self%threads)
+      do j = 1, self%rows
+         call self%work%runs%spread(j, self%work%contact(:, j), self%fields%contact(:, j))
+         do c = 1, 2
+            call self%work%runs%spread(j, self%work%traction(:, c, j), self%fields%traction(:, c, j))
+         end do
+      end do
+   end subroutine finish
 
    !> Let a point that is expected to slip far start along that slip. Its slip is long compared with the displacement
    !> of a cell under its own bound, so that its direction hardly depends on the tractions that are still to be
@@ -162,11 +232,11 @@ contains
       integer, intent(inout) :: foreseen           !! points that start so
       real(dp) :: slip(2), length
 
-      slip = self%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), self%slip(i, :, j))
+      slip = self%fields%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), self%work%slip(i, :, j))
       length = sqrt(slip(1)**2 + slip(2)**2)       ! not norm2, whose rounding depends on the size of the numbers
-      if (length <= far*self%compliance*self%work%bound(i, 1, j)) return
-      t = self%law%normal_traction(self%pressure(i, j), self%slope_at(i, j)) &
-         + (self%work%bound(i, 1, j)/length)*slip
+      if (length <= far*self%compliance*self%work%site(i, 4, j)) return
+      t = self%law%normal_traction(self%pressure_at(i, j), self%slope_at(i, j)) &
+         + (self%work%site(i, 4, j)/length)*slip
       limit = unbounded
       foreseen = foreseen + 1
    end subroutine start_along_slip
@@ -181,9 +251,18 @@ contains
       real(dp) :: share(2)
 
       share = 1.0_dp
-      if (associated(self%share)) share = self%share(i, j)
-      call self%law%place_on_bound(self%pressure(i, j), self%slope_at(i, j), limit, t, s, share)
+      if (allocated(self%work%share)) share = self%work%share(i, j)
+      call self%law%place_on_bound(self%pressure_at(i, j), self%slope_at(i, j), limit, t, s, share)
    end subroutine place_on_bound
+
+   !> P at a point, Pa.
+   pure function pressure_at(self, i, j) result(pressure)
+      class(friction_problem_type), intent(in) :: self
+      integer, intent(in) :: i, j
+      real(dp) :: pressure
+
+      pressure = self%work%site(i, 1, j)
+   end function pressure_at
 
    !> grad H at a point; 0 if the slope effect is off.
    pure function slope_at(self, i, j) result(slope)
@@ -191,40 +270,36 @@ contains
       integer, intent(in) :: i, j
       real(dp) :: slope(2)
 
-      slope = 0.0_dp
-      if (self%law%slope_effect) slope = [self%slope_x(i, j), self%slope_y(i, j)]
+      slope = self%work%site(i, 2:3, j)
    end function slope_at
 
-   !> Gather what stays constant during a solve at the points of a row, in the columns that module
-   !> `friction_rows` expects: pressure, slopes and the two columns of the bound.
-   pure subroutine gather_site(self, j, site)
+   !> Transform a row of a field of the solution, after spreading it over the row of the grid.
+   subroutine spread_to_transform(self, operator, row, j)
       class(friction_problem_type), intent(in) :: self
+      type(convolution_type), intent(inout) :: operator
+      real(dp), intent(in), contiguous :: row(:, :)        !! [width, 2]
       integer, intent(in) :: j
-      real(dp), intent(out) :: site(self%nx, site_columns)
+      real(dp) :: whole(self%nx)
+      integer :: c
 
-      site(:, 1) = self%pressure(:, j)
-      if (self%law%slope_effect) then
-         site(:, 2) = self%slope_x(:, j)
-         site(:, 3) = self%slope_y(:, j)
-      else
-         site(:, 2:3) = 0.0_dp
-      end if
-      site(:, 4:5) = self%work%bound(:, :, j)
-   end subroutine gather_site
+      do c = 1, 2
+         call self%work%runs%spread(j, row(:, c), whole)
+         call operator%forward_row(c, j, whole)
+      end do
+   end subroutine spread_to_transform
 
    !> Transform a row of T, or of T + T_h.
    subroutine transform_row(self, operator, j)
       class(friction_problem_type), intent(in) :: self
       type(convolution_type), intent(inout) :: operator
       integer, intent(in) :: j
+      real(dp) :: whole(self%nx)
       integer :: c
 
       do c = 1, 2
-         if (associated(self%past)) then
-            call operator%forward_row(c, j, self%traction(:, c, j) + self%past(:, c, j))
-         else
-            call operator%forward_row(c, j, self%traction(:, c, j))
-         end if
+         call self%work%runs%spread(j, self%work%traction(:, c, j), whole)
+         if (associated(self%fields%past)) whole(:) = whole + self%fields%past(:, c, j)
+         call operator%forward_row(c, j, whole)
       end do
    end subroutine transform_row
 
@@ -255,7 +330,7 @@ contains
       type(convolution_type), intent(inout) :: operator
 
       self%fresh = .true.
-      call self%spring%follow(self%traction)
+      call self%spring%follow(self%work%traction)
       call operator%columns(columns_apply)
       call finish_slip(self, operator, 1.0_dp)
    end subroutine update_slip
@@ -267,7 +342,7 @@ contains
       real(dp), intent(in) :: step
 
       self%fresh = .false.
-      call self%spring%follow(self%traction)
+      call self%spring%follow(self%work%traction)
       call finish_slip(self, operator, step)
    end subroutine advance_slip
 
@@ -301,10 +376,11 @@ contains
       do c = 1, 2
          call operator%backward_row(c, j, u)
          if (self%fresh) then
-            self%slip(:, c, j) = self%drive(:, c, j) + self%spring%offset(c) - u
+            self%fields%slip(:, c, j) = self%fields%drive(:, c, j) + self%spring%offset(c) - u
          else
-            self%slip(:, c, j) = self%slip(:, c, j) + self%spring%offset_step(c) - factor*u
+            self%fields%slip(:, c, j) = self%fields%slip(:, c, j) + self%spring%offset_step(c) - factor*u
          end if
+         call self%work%runs%gather(j, self%fields%slip(:, c, j), self%work%slip(:, c, j))
       end do
    end subroutine finish_slip_row
 
@@ -314,11 +390,11 @@ contains
       integer :: c, j
 
       self%fresh = .true.
-      call self%spring%follow(self%traction)
+      call self%spring%follow(self%work%traction)
       do c = 1, 2
          !$omp parallel do default(none) shared(self, c) private(j) num_threads(self%threads)
          do j = 1, self%rows
-            self%slip(:, c, j) = self%drive(:, c, j)
+            self%fields%slip(:, c, j) = self%fields%drive(:, c, j)
          end do
       end do
       call shift_slip(self, self%spring%offset)
@@ -338,13 +414,15 @@ contains
       type(friction_problem_type), intent(inout) :: self
       real(dp), intent(in) :: shift(2)               !! m
       type(measure_sums_type), allocatable :: rows(:)
-      integer :: j
+      integer :: c, j
 
       allocate (rows(self%rows))
-      !$omp parallel do default(none) shared(self, shift, rows) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, shift, rows) private(c, j) num_threads(self%threads)
       do j = 1, self%rows
-         self%slip(:, 1, j) = self%slip(:, 1, j) + shift(1)
-         self%slip(:, 2, j) = self%slip(:, 2, j) + shift(2)
+         do c = 1, 2
+            self%fields%slip(:, c, j) = self%fields%slip(:, c, j) + shift(c)
+            call self%work%runs%gather(j, self%fields%slip(:, c, j), self%work%slip(:, c, j))
+         end do
          call measure_row(self, j, rows(j))
       end do
       call finish_measure(self, rows)
@@ -355,16 +433,21 @@ contains
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       type(measure_sums_type), intent(out) :: sums
-      real(dp) :: site(self%nx, site_columns), state(self%nx), released
+      real(dp) :: drive(self%width, 2), state(self%width), released
+      integer :: c
 
-      call self%gather_site(j, site)
-      state = self%contact(:, j)
-      call tangent_row(self%constants, site, self%traction(:, :, j), self%slip(:, :, j), state, &
-         self%work%tangent(:, :, j), released)
-      call measured_row(self%compliance, self%traction(:, :, j), self%work%old(:, :, j), &
-         self%slip(:, :, j), self%drive(:, :, j), state, self%work%tangent(:, :, j), sums)
-      sums%released = released
-      self%contact(:, j) = int(state, int8)
+      associate (work => self%work)
+         do c = 1, 2
+            call work%runs%gather(j, self%fields%drive(:, c, j), drive(:, c))
+         end do
+         state(:) = work%contact(:, j)
+         call tangent_row(self%constants, work%site(:, :, j), work%traction(:, :, j), work%slip(:, :, j), state, &
+            work%tangent(:, :, j), released)
+         call measured_row(self%compliance, work%traction(:, :, j), work%old(:, :, j), work%slip(:, :, j), drive, &
+            state, work%tangent(:, :, j), sums)
+         sums%released = released
+         work%contact(:, j) = int(state, int8)
+      end associate
    end subroutine measure_row
 
    !> Compute the residual from the sums of `measure_row`.

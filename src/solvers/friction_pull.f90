@@ -56,7 +56,7 @@ contains
       self%slides_off = .false.
       if (.not. any(self%along)) return
       cells = operator%grid%cells()
-      touching = max(1.0_dp, field_count(problem%contact /= contact_open))
+      touching = max(1.0_dp, field_count(problem%fields%contact /= contact_open))
       problem%spring%pulled = self%along
       do c = 1, 2
          if (.not. self%along(c)) cycle
@@ -100,7 +100,7 @@ contains
       real(dp) :: total
 
       total = 0.0_dp
-      if (associated(problem%past)) total = field_sum(problem%past(:, c, :))
+      if (associated(problem%fields%past)) total = field_sum(problem%fields%past(:, c, :))
    end function past_total
 
    !> The pull minus the total of T, Pa; 0 along a direction that is not pulled or whose force acts on a mass.
