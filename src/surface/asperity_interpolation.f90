@@ -30,7 +30,7 @@
 !> field.
 module asperity_interpolation
    use bilinear_map, only : bilinear_slopes
-   use cubic_spline, only : spline_coefficients, spline_map
+   use cubic_spline, only : most_places, spline_coefficients, spline_run
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
    use field_sums, only : field_minimum
@@ -138,11 +138,12 @@ contains
    subroutine shifted(self, shift_x, shift_y, height, slope_x, slope_y)
       type(interpolation_type), intent(inout) :: self
       real(dp), intent(in) :: shift_x, shift_y     !! D, m
-      real(dp), intent(out) :: height(:, :)        !! H, m, shape [nx, rows of this process]
-      real(dp), intent(out) :: slope_x(:, :)       !! dH_0/dx at X - D, shape [nx, rows of this process]
-      real(dp), intent(out) :: slope_y(:, :)       !! dH_0/dy at X - D, shape [nx, rows of this process]
+      real(dp), intent(out), contiguous :: height(:, :)    !! H, m, shape [nx, rows of this process]
+      real(dp), intent(out), contiguous :: slope_x(:, :)   !! dH_0/dx at X - D, shape [nx, rows of this process]
+      real(dp), intent(out), contiguous :: slope_y(:, :)   !! dH_0/dy at X - D, shape [nx, rows of this process]
       type(shift_type) :: shift
-      integer :: i, j
+      real(dp), allocatable :: p(:), q(:)
+      integer :: j
 
       shift = shift_in_cells(self%grid, [shift_x, shift_y])
       if (self%periodic .and. .not. self%cubic .and. shift%is_whole()) then
@@ -152,12 +153,12 @@ contains
          return
       end if
       call have_shifted_rows(self, shift)
-      !$omp parallel do default(none) shared(self, height, slope_x, slope_y, shift) private(i)
+      allocate (p(self%grid%nx), q(self%grid%nx))
+      p(:) = -shift%part(1)
+      q(:) = -shift%part(2)
+      !$omp parallel do default(none) shared(self, height, slope_x, slope_y, shift, p, q)
       do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            call map_at(self, i - 1 - shift%whole(1), shift%first + j - 1, -shift%part(1), -shift%part(2), &
-               height(i, j), slope_x(i, j), slope_y(i, j))
-         end do
+         call map_row(self, -shift%whole(1), shift%first + j - 1, p, q, height(:, j), slope_x(:, j), slope_y(:, j))
       end do
       ! For whole cells take the heights themselves, because the spline gives them with round-off.
       if (shift%is_whole()) call moved_height(self, shift%whole, height)
@@ -170,25 +171,22 @@ contains
       real(dp), intent(in) :: shift_x, shift_y          !! D, m
       real(dp), intent(in) :: displacement_x(:, :)      !! s along x, m, shape [nx, rows of this process]
       real(dp), intent(in) :: displacement_y(:, :)      !! s along y, m, shape [nx, rows of this process]
-      real(dp), intent(out) :: height(:, :)             !! H, m, shape [nx, rows of this process]
-      real(dp), intent(out) :: slope_x(:, :)            !! dH_0/dx at X + s - D, shape [nx, rows of this process]
-      real(dp), intent(out) :: slope_y(:, :)            !! dH_0/dy at X + s - D, shape [nx, rows of this process]
+      real(dp), intent(out), contiguous :: height(:, :)    !! H, m, shape [nx, rows of this process]
+      real(dp), intent(out), contiguous :: slope_x(:, :)   !! dH_0/dx at X + s - D, shape [nx, rows of this process]
+      real(dp), intent(out), contiguous :: slope_y(:, :)   !! dH_0/dy at X + s - D, shape [nx, rows of this process]
       type(shift_type) :: shift
-      integer :: i, j
+      integer :: j
       real(dp) :: per_dx, per_dy
 
       shift = shift_in_cells(self%grid, [shift_x, shift_y])
       per_dx = 1.0_dp/self%grid%dx
       per_dy = 1.0_dp/self%grid%dy
       call have_displaced_rows(self, shift, displacement_y)
-      !$omp parallel do default(none) private(i) shared(self, height, slope_x, slope_y, &
-      !$omp displacement_x, displacement_y, shift, per_dx, per_dy)
+      !$omp parallel do default(none) shared(self, height, slope_x, slope_y, displacement_x, displacement_y, shift, &
+      !$omp per_dx, per_dy)
       do j = 1, self%grid%rows()
-         do i = 1, self%grid%nx
-            call map_at(self, i - 1 - shift%whole(1), shift%first + j - 1, &
-               displacement_x(i, j)*per_dx - shift%part(1), displacement_y(i, j)*per_dy - shift%part(2), &
-               height(i, j), slope_x(i, j), slope_y(i, j))
-         end do
+         call map_row(self, -shift%whole(1), shift%first + j - 1, displacement_x(:, j)*per_dx - shift%part(1), &
+            displacement_y(:, j)*per_dy - shift%part(2), height(:, j), slope_x(:, j), slope_y(:, j))
       end do
    end subroutine displaced
 
@@ -269,31 +267,54 @@ contains
       below = floor(max(-1.0e9_dp, min(1.0e9_dp, q)))
    end function whole_below
 
-   !> Height and slopes at the place (i + p, j + q), in cells from 0.
-   pure subroutine map_at(self, i, j, p, q, h, h_x, h_y)
+   !> Heights and slopes at the places (i + p_1, j + q_1), (i + 1 + p_2, j + q_2), and so on, in cells from 0.
+   !>
+   !> Most neighbours lie in neighbouring cells, because the rubber is displaced smoothly. Such runs are read together.
+   pure subroutine map_row(self, i, j, p, q, h, h_x, h_y)
       type(interpolation_type), intent(in) :: self
       integer, intent(in) :: i, j
-      real(dp), intent(in) :: p, q
-      real(dp), intent(out) :: h, h_x, h_y
-      integer :: cell_x, cell_y
-      real(dp) :: u, v, weight_x, weight_y
+      real(dp), intent(in) :: p(:), q(:)
+      real(dp), intent(out), contiguous :: h(:), h_x(:), h_y(:)
+      integer :: cell_x(size(p)), cell_y(size(p)), first, k, last
+      real(dp) :: u(size(p)), v(size(p)), weight_x(size(p)), weight_y(size(p))
 
-      call locate(self%periodic, self%grid%nx, i, p, cell_x, u, weight_x)
+      call locate(self%periodic, self%grid%nx, [(i + k - 1, k=1, size(p))], p, cell_x, u, weight_x)
       call locate(self%periodic, self%grid%ny, j, q, cell_y, v, weight_y)
-      if (self%cubic) then
-         call spline_map(self%rows%values, cell_x, self%rows%place(cell_y - 1:cell_y + 2), u, v, h, h_x, h_y)
-      else
-         call bilinear_slopes(self%rows, cell_x, cell_y, u, v, h, h_x, h_y)
-      end if
-      h_x = h_x/self%grid%dx
-      h_y = h_y/self%grid%dy
-      if (self%grid%ny == 1) h_y = 0.0_dp
-      if (.not. self%periodic) then
-         h = blend(h, self%lowest, weight_x*weight_y)
-         h_x = weight_x*weight_y*h_x
-         h_y = weight_x*weight_y*h_y
-      end if
-   end subroutine map_at
+      first = 1
+      do while (first <= size(p))
+         last = end_of_run(self%cubic, cell_x, cell_y, first)
+         if (self%cubic) then
+            call spline_run(self%rows%values, cell_x(first), self%rows%place(cell_y(first) - 1:cell_y(first) + 2), &
+               u(first:last), v(first:last), h(first:last), h_x(first:last), h_y(first:last))
+         else
+            call bilinear_slopes(self%rows, cell_x(first), cell_y(first), u(first), v(first), h(first), h_x(first), &
+               h_y(first))
+         end if
+         first = last + 1
+      end do
+      h_x(:) = h_x/self%grid%dx
+      h_y(:) = h_y/self%grid%dy
+      if (self%grid%ny == 1) h_y(:) = 0.0_dp
+      if (self%periodic) return
+      weight_x(:) = weight_x*weight_y
+      h(:) = blend(h, self%lowest, weight_x)
+      h_x(:) = weight_x*h_x
+      h_y(:) = weight_x*h_y
+   end subroutine map_row
+
+   !> The last place of the run of neighbouring cells that begins at `first`. The bilinear map is read place by place.
+   pure integer function end_of_run(cubic, cell_x, cell_y, first) result(last)
+      logical, intent(in) :: cubic
+      integer, intent(in) :: cell_x(:), cell_y(:)
+      integer, intent(in) :: first
+
+      last = first
+      if (.not. cubic) return
+      do while (last < min(size(cell_x), first + most_places - 1))
+         if (cell_x(last + 1) /= cell_x(last) + 1 .or. cell_y(last + 1) /= cell_y(last)) return
+         last = last + 1
+      end do
+   end function end_of_run
 
    !> Mean of h with this weight and the lowest height with the rest.
    elemental function blend(h, lowest, weight) result(mixed)

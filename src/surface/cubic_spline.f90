@@ -19,8 +19,9 @@ module cubic_spline
    implicit none
    private
 
-   public :: spline_coefficients, spline_map
+   public :: most_places, spline_coefficients, spline_run
 
+   integer, parameter :: most_places = 64       !! of a run of neighbouring cells that is evaluated together
    integer, parameter :: terms = 60             !! of a geometric series in z; |z|^60 < 1e-34
 
    !> The filter along y.
@@ -181,56 +182,54 @@ contains
       lines(:, n + 1) = lines(:, n)
    end subroutine filter_bounded
 
-   !> Height at (i + u, j + v), and its slopes per cell (not per metre).
-   pure subroutine spline_map(c, i, rows, u, v, h, h_u, h_v)
-      real(dp), intent(in) :: c(-1:, :)         !! coefficients, in any rows
-      integer, intent(in) :: i                  !! cell along x, from 0
-      integer, intent(in) :: rows(4)            !! of the coefficients j - 1 to j + 2
-      real(dp), intent(in) :: u, v              !! 0 to 1
-      real(dp), intent(out) :: h                !! m
-      real(dp), intent(out) :: h_u, h_v         !! m per cell
-      real(dp) :: a(4), a_u(4), b(4), b_v(4), row, row_u
-      integer :: m
+   !> Heights at (i + u_1, j + v_1), (i + 1 + u_2, j + v_2), and so on, for at most `most_places` places, and their slopes
+   !> per cell (not per metre). The coefficients stand side by side, so that the compiler can vectorise the loops.
+   pure subroutine spline_run(c, i, rows, u, v, h, h_u, h_v)
+      real(dp), intent(in), contiguous :: c(-1:, :)     !! coefficients, in any rows
+      integer, intent(in) :: i                          !! first cell along x, from 0
+      integer, intent(in) :: rows(4)                    !! of the coefficients j - 1 to j + 2
+      real(dp), intent(in), contiguous :: u(:), v(:)    !! 0 to 1
+      real(dp), intent(out), contiguous :: h(:)         !! m
+      real(dp), intent(out), contiguous :: h_u(:), h_v(:)   !! m per cell
+      real(dp), dimension(most_places, 4) :: a, a_u, b, b_v
+      real(dp) :: row, row_u
+      integer :: k, m, n
 
-      a = weights(u)
-      b = weights(v)
-      a_u = weight_slopes(u)
-      b_v = weight_slopes(v)
-      h = 0.0_dp
-      h_u = 0.0_dp
-      h_v = 0.0_dp
+      call find_weights(u, a, a_u)
+      call find_weights(v, b, b_v)
+      h(:) = 0.0_dp
+      h_u(:) = 0.0_dp
+      h_v(:) = 0.0_dp
       do m = 1, 4
-         row = a(1)*c(i - 1, rows(m)) + a(2)*c(i, rows(m)) &
-            + a(3)*c(i + 1, rows(m)) + a(4)*c(i + 2, rows(m))
-         row_u = a_u(1)*c(i - 1, rows(m)) + a_u(2)*c(i, rows(m)) &
-            + a_u(3)*c(i + 1, rows(m)) + a_u(4)*c(i + 2, rows(m))
-         h = h + b(m)*row
-         h_u = h_u + b(m)*row_u
-         h_v = h_v + b_v(m)*row
+         n = rows(m)
+         do k = 1, size(u)
+            row = a(k, 1)*c(i + k - 2, n) + a(k, 2)*c(i + k - 1, n) + a(k, 3)*c(i + k, n) + a(k, 4)*c(i + k + 1, n)
+            row_u = a_u(k, 1)*c(i + k - 2, n) + a_u(k, 2)*c(i + k - 1, n) + a_u(k, 3)*c(i + k, n) &
+               + a_u(k, 4)*c(i + k + 1, n)
+            h(k) = h(k) + b(k, m)*row
+            h_u(k) = h_u(k) + b(k, m)*row_u
+            h_v(k) = h_v(k) + b_v(k, m)*row
+         end do
       end do
-   end subroutine spline_map
+   end subroutine spline_run
 
-   !> Values of the cubic B-splines of the four nearest cells, at the fraction u of a cell.
-   pure function weights(u) result(w)
-      real(dp), intent(in) :: u
-      real(dp) :: w(4)
+   !> Values of the cubic B-splines of the four nearest cells, at the fractions u of a cell, and their derivatives.
+   pure subroutine find_weights(u, w, slopes)
+      real(dp), intent(in), contiguous :: u(:)
+      real(dp), intent(out) :: w(most_places, 4), slopes(most_places, 4)
       real(dp), parameter :: sixth = 1.0_dp/6.0_dp
+      integer :: k
 
-      w(1) = sixth*(1.0_dp - u)**3
-      w(2) = sixth*(4.0_dp + u*u*(3.0_dp*u - 6.0_dp))
-      w(3) = sixth*(1.0_dp + 3.0_dp*u*(1.0_dp + u*(1.0_dp - u)))
-      w(4) = sixth*u**3
-   end function weights
-
-   !> Derivatives of `weights` with respect to u.
-   pure function weight_slopes(u) result(w)
-      real(dp), intent(in) :: u
-      real(dp) :: w(4)
-
-      w(1) = -0.5_dp*(1.0_dp - u)**2
-      w(2) = u*(1.5_dp*u - 2.0_dp)
-      w(3) = 0.5_dp + u*(1.0_dp - 1.5_dp*u)
-      w(4) = 0.5_dp*u**2
-   end function weight_slopes
+      do k = 1, size(u)
+         w(k, 1) = sixth*(1.0_dp - u(k))**3
+         w(k, 2) = sixth*(4.0_dp + u(k)*u(k)*(3.0_dp*u(k) - 6.0_dp))
+         w(k, 3) = sixth*(1.0_dp + 3.0_dp*u(k)*(1.0_dp + u(k)*(1.0_dp - u(k))))
+         w(k, 4) = sixth*u(k)**3
+         slopes(k, 1) = -0.5_dp*(1.0_dp - u(k))**2
+         slopes(k, 2) = u(k)*(1.5_dp*u(k) - 2.0_dp)
+         slopes(k, 3) = 0.5_dp + u(k)*(1.0_dp - 1.5_dp*u(k))
+         slopes(k, 4) = 0.5_dp*u(k)**2
+      end do
+   end subroutine find_weights
 
 end module cubic_spline
