@@ -20,6 +20,7 @@ module case_run
    use rising_clock, only : seconds_now
    use run_files, only : run_files_type
    use text_tools, only : add_line, to_text
+   use wisdom, only : wisdom_warning
    implicit none
    private
 
@@ -71,6 +72,8 @@ contains
          call self%files%begin(self%sim, self%rows, error)
       end if
       call collect_warnings(self)
+      ! This warning is about the user's machine. It is not written to the result.
+      if (len(wisdom_warning()) > 0) call add_line(self%warnings, wisdom_warning())
    end subroutine open_run
 
    !> Check that every machine has the memory that its processes need. Collective.
