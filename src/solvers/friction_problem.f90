@@ -160,9 +160,10 @@ contains
       real(dp), intent(inout) :: t(2)              !! Pa
       real(dp), intent(inout) :: limit             !! of s below which it is put on its bound
       integer, intent(inout) :: foreseen           !! points that start so
-      real(dp) :: slip(2), length
+      real(dp) :: r(2), slip(2), length
 
-      slip = self%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), self%slip(i, :, j))
+      r = self%slip(i, :, j)
+      slip = self%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), r)
       length = sqrt(slip(1)**2 + slip(2)**2)       ! not norm2, whose rounding depends on the size of the numbers
       if (length <= far*self%compliance*self%work%bound(i, 1, j)) return
       t = self%law%normal_traction(self%pressure(i, j), self%slope_at(i, j)) &
