@@ -1,5 +1,6 @@
 """Normal contact on numpy arrays."""
 
+import subprocess
 import threading
 from dataclasses import fields
 
@@ -71,6 +72,62 @@ def test_rough_contact_is_complementary_and_balanced():
     q[0, 0] = np.inf
     response = np.fft.irfft2(2 / (1e6 * q) * np.fft.rfft2(contact.pressure), s=(64, 96))
     np.testing.assert_allclose(contact.displacement_z, response, atol=1e-9 * np.ptp(height))
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+@pytest.mark.parametrize("method", ["fast", "thesis"])
+@pytest.mark.parametrize("displacement", [0.0, -1e-5])
+def test_without_touch_the_pressure_is_zero(program, tmp_path, boundary, method, displacement):
+    """The command accepted such a displacement, and `solve_normal` refused it."""
+    height = rough()
+    given = {"displacement": displacement, "boundary": boundary, "method": method}
+    warm = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, pressure=1e4, boundary=boundary)
+    for start in (None, warm):
+        contact = asperity.solve_normal(height, 1.5e-3, 1e-3, 1e6, start=start, **given)
+        assert contact.converged and not contact.pressure.any()
+        assert contact.force == contact.contact_area == 0.0
+        assert contact.displacement == pytest.approx(displacement, abs=1e-18)
+        np.testing.assert_allclose(contact.gap, height.max() - displacement - height, atol=1e-18)
+    asperity.surface.save(tmp_path / "road.h5", height, 1.5e-3, 1e-3)
+    (tmp_path / "case.nml").write_text(f"""
+        &grid nx = 96, ny = 64, lx = 1.5e-3, ly = 1e-3, boundary = '{boundary}' /
+        &surface shape = 'file', file = 'road.h5' /
+        &material shear_modulus = 1e6 /
+        &solver method = '{method}' /
+        &phase displacement = {displacement} /""")
+    subprocess.run([program, "run", "case.nml", "--quiet"], cwd=tmp_path, check=True)
+    run = asperity.open(tmp_path / "case.h5")
+    assert run.history["pressure"][-1] == run.history["contact_area"][-1] == 0.0
+    np.testing.assert_allclose(run.snapshots[-1].gap, contact.gap, atol=1e-18)
+
+
+def test_a_run_names_the_displacement_of_full_contact(program, tmp_path):
+    """It refuses a jump beyond before the first row; a ramp ends where there is no solution."""
+    def run(phases, boundary="periodic"):
+        (tmp_path / "case.nml").write_text(f"""
+            &grid nx = 20, ny = 24, lx = 1.0, boundary = '{boundary}' /
+            &surface shape = 'sine', amplitude = 1e-3, wavelength = 1.0 /
+            &material shear_modulus = 1e6 /
+            {phases}""")
+        done = subprocess.run([program, "run", "case.nml", "--quiet", "--overwrite"], cwd=tmp_path,
+                              text=True, capture_output=True)
+        return done.returncode, done.stderr
+
+    limit = (" must be below 0.001 m, the mean gap at first touch: beyond it the pressure of a"
+             " periodic contact is not determined")
+    for before, phase in (("", 1), ("&phase displacement = 1e-4 / &phase pressure = 1.0 /", 3)):
+        assert run(before + "&phase displacement = 2e-3 /") == (
+            2, f"case.nml: &phase: displacement = 0.002 m of phase {phase}:{limit}\n")
+        assert not (tmp_path / "case.h5").exists()
+
+    ramp = "&phase displacement = {}, ramp = 'linear', duration = 1.0, steps = 4 /"
+    status, message = run(ramp.format(2.4e-3))
+    assert status == 4 and "step 2 of phase 1, t = 0.5 s: the solver did not converge" in message
+    assert f"full contact: the displacement leaves no gap. It is 0.0012 m and{limit};" in message
+    history = asperity.open(tmp_path / "case.h5").history
+    assert history.rows == 3 and history["pressure"][1] > 0.0
+    assert run(ramp.format(0.99e-3))[0] == 0
+    assert run("&phase displacement = 2e-3 /", "free")[0] == 0
 
 
 def test_displacement_gives_back_the_load():

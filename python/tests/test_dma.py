@@ -348,7 +348,7 @@ WRONG = [
      ["column temperature: has the unit 'F': must be one of C, K"]),
     ("f (Hz),G' (Pa),G'' (Pa)\n1,2,3\n2,3,4\n", ["has 2 rows of numbers: must have at least 3"]),
     ("f (Hz),G' (Pa),G'' (Pa)\n", ["has a header and no numbers"]),
-    ("\n# nothing\n", ["is empty"]),
+    ("\n\n", ["is empty"]), ("\n# nothing\n", ["holds only comments"]),
 ]
 
 

@@ -688,6 +688,44 @@ def test_marks_on_the_page(curve, tmp_path):
         assert browser.console() == []
 
 
+def six_temperatures(curve):
+    """Return twelve curves over the speed: two pressures, six temperatures."""
+    def more(array, axis):
+        return np.repeat(array, 3, axis) * np.linspace(1.0, 1.5, 6).reshape(
+            (-1, *(array.ndim - axis - 1) * (1,)))
+
+    return replace(curve, temperature=np.linspace(20.0, 70.0, 6), a_t=more(curve.a_t, 0),
+                   b_t=more(curve.b_t, 0), remarks=[], losses={}, sources={},
+                   values={name: more(array, 1) for name, array in curve.values.items()},
+                   theory={name: more(array, 1) for name, array in curve.theory.items()})
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
+def test_many_curves_have_the_same_colours_on_the_page_as_in_the_picture(curve, tmp_path):
+    """The page repeated its seven colours from the eighth curve on."""
+    many = six_temperatures(curve)
+    wanted = [line.get_color() for line in many.plot().axes[0].lines if line.get_marker() == "o"]
+    assert len(set(wanted)) == 12
+    page = many.to_html(tmp_path / "curve.html")
+    drawn = ("return [...document.querySelectorAll('#curves figure:first-child path.line')].map("
+             "(path) => getComputedStyle(path).stroke.match(/\\d+/g).map((part) =>"
+             " Number(part).toString(16).padStart(2, '0')).join(''))")
+    against = ("const choice = document.getElementById('against'); choice.value = arguments[0];"
+               " choice.dispatchEvent(new Event('change'))")
+    with Browser(tmp_path) as browser:
+        for dark in (False, True):
+            browser.window(1200, 900, dark=dark)
+            browser.open(page)
+            colours = [f"#{colour}" for colour in browser.run(drawn)]
+            assert len(set(colours)) == 12
+            assert (colours == wanted) == (not dark)
+            # Fewer curves have the colours of the palette.
+            browser.run(against, "temperature")
+            few = browser.run(drawn)
+            assert len(few) == len(set(few)) == 2
+        assert browser.console() == []
+
+
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
 def test_page_in_a_browser(curve, tmp_path):
     page = curve.to_html(tmp_path / "curve.html")

@@ -152,6 +152,16 @@ def test_a_text_of_any_length_is_no_binary_map(tmp_path):
         load(path)
 
 
+@pytest.mark.parametrize("text", ["# a\n# b\n", "# Channel: Topo\n# Width: 10 um\n\n#\n"])
+@pytest.mark.parametrize("ending", ["txt", "xyz", "csv"])
+def test_a_map_of_comments_only(tmp_path, text, ending):
+    """It was said to be empty, and a text of 2 n^2 bytes to be of no known format."""
+    path = tmp_path / f"map.{ending}"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=rf"^{re.escape(str(path))}: holds only comments$"):
+        load(path, unit="um", size=(LX, LY))
+
+
 def test_points_on_a_grid_with_holes(tmp_path):
     """A list of points leaves out those that were not measured; their places are filled."""
     y, x = np.mgrid[0:NY, 0:NX]

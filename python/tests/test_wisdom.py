@@ -7,6 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+from conftest import PATIENCE
+
 CASE = """&grid nx = {n}, ny = {n}, lx = 1.0 /
 &surface shape = 'sine', amplitude = 1e-3, wavelength = 1.0 /
 &material shear_modulus = 1e6 /
@@ -57,3 +60,33 @@ def test_wisdom_is_kept(program: Path, tmp_path: Path) -> None:
         solve(n)
     assert (state(double), state(single)) == kept, "the plans of another process were lost"
     assert sorted(path.name for path in double.parent.iterdir()) == ["fftw", "fftwf"]
+
+
+@pytest.mark.parametrize("kind", ["device", "pipe", "folder", "huge"])
+def test_a_file_of_wisdom_that_cannot_be_one_is_not_read(
+        program: Path, tmp_path: Path, kind: str) -> None:
+    """A link to /dev/zero was read for ever, and the run waited for a writer of a pipe."""
+    folder = tmp_path / "asperity"
+    folder.mkdir()
+    path = folder / "fftw"
+    if kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        with path.open("wb") as file:
+            file.truncate(2**40)  # zeros that take no space on the disk
+    before = path.lstat()
+    (tmp_path / "case.nml").write_text(CASE.format(n=20, precision="mixed"))
+    environment = dict(os.environ, XDG_CACHE_HOME=str(tmp_path), OMP_NUM_THREADS="1")
+    run = subprocess.run([str(program), "run", str(tmp_path / "case.nml")], timeout=PATIENCE,
+                         text=True, capture_output=True, env=environment)
+    assert run.returncode == 0, run.stderr
+    fault = "is larger than 64 MB" if kind == "huge" else "is no regular file"
+    assert f"{path}: {fault}, and is ignored." in run.stderr
+    # What the user has put there is not touched.
+    after = path.lstat()
+    assert (after.st_ino, after.st_mtime_ns) == (before.st_ino, before.st_mtime_ns)
+    assert [one.name for one in folder.iterdir()] == ["fftw"]

@@ -20,6 +20,7 @@ module asperity_simulation
    use contact_model, only : commit_step, contact_type, new_contact, place_road, solve_normal
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
+   use full_contact, only : largest_displacement, limit_in_words
    use history_table, only : row_values
    use normal_state, only : reason_undetermined
    use pulled_road, only : guess_road, pull_outcome, place_pulled_road, watch_motion
@@ -321,6 +322,7 @@ contains
          end if
       else
          call note_outcome(self, found%normal)
+         if (found%normal%reason == reason_undetermined) call note_full_contact(self, plan)
       end if
       if (found%passes > 0) call check_passes(self, plan, found)
    end subroutine judge
@@ -334,8 +336,17 @@ contains
       self%allowed = merge(outcome%required, self%case%solver%tolerance, outcome%required > 0.0_dp)
       self%residual = outcome%residual
       if (outcome%residual <= self%allowed .and. outcome%load_error > self%allowed) self%residual = outcome%load_error
-      if (outcome%reason == reason_undetermined) self%residual = 0.0_dp     ! no accuracy would help
    end subroutine note_outcome
+
+   !> Add to the reason which displacements have a solution. No accuracy would help, so that the residual is not named.
+   subroutine note_full_contact(self, plan)
+      type(simulation_type), intent(inout) :: self
+      type(planned_row_type), intent(in) :: plan
+
+      self%residual = 0.0_dp
+      self%reason = trim(self%reason)//'. It is '//to_text(plan%load)//' m and must be below '// &
+         to_text(largest_displacement(self))//limit_in_words
+   end subroutine note_full_contact
 
    !> One sentence about a row that has not converged. It compares an error with the allowed one only if this error is
    !> the reason.

@@ -14,12 +14,14 @@ module case_run
    use asperity_threads, only : set_threads
    use case_memory, only : memory_needed
    use case_settings, only : case_type
+   use full_contact, only : check_displacements
    use memory_limits, only : need_memory
    use process_agreement, only : agree
    use regular_grid, only : grid_type
    use rising_clock, only : seconds_now
    use run_files, only : run_files_type
    use text_tools, only : add_line, to_text
+   use wisdom, only : wisdom_warning
    implicit none
    private
 
@@ -64,6 +66,7 @@ contains
       call check_memory(case, error)
       if (.not. allocated(error)) call new_simulation(self%sim, case, error)
       call agree(error)
+      call check_displacements(self%sim, error)
       if (allocated(error)) return
       if (restart) then
          call resume(self, error)
@@ -71,6 +74,8 @@ contains
          call self%files%begin(self%sim, self%rows, error)
       end if
       call collect_warnings(self)
+      ! This warning is about the user's machine. It is not written to the result.
+      if (len(wisdom_warning()) > 0) call add_line(self%warnings, wisdom_warning())
    end subroutine open_run
 
    !> Check that every machine has the memory that its processes need. Collective.

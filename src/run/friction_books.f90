@@ -47,7 +47,7 @@ contains
       real(dp), intent(in) :: trial(:, :, :)          !! [nx, 2, rows] displacement at the end, m
       type(rubbed_type), intent(out) :: rubbed
       real(dp), allocatable :: rows(:, :)
-      real(dp) :: a, force, rubbing(2), share(2), slope(2), total(4)
+      real(dp) :: a, before(2), force, rubbing(2), share(2), slip(2), slope(2), total(4)
       integer :: i, j
 
       allocate (rows(4, size(trial, 3)), source=0.0_dp)
@@ -55,7 +55,7 @@ contains
       share = 1.0_dp
       a = compliance*sqrt(field_count(state%contact /= contact_open))
       !$omp parallel do default(none) shared(state, law, a, fields, trial, rows) &
-      !$omp private(i, j, force, rubbing) firstprivate(share, slope)
+      !$omp private(i, j, before, force, rubbing, slip) firstprivate(share, slope)
       do j = 1, size(trial, 3)
          do i = 1, size(trial, 1)
             rubbing = 0.0_dp
@@ -69,8 +69,11 @@ contains
                rows(4, j) = rows(4, j) + 1.0_dp
             end if
             ! The slip of a point that sticks is an error within the tolerance of the solver, and causes no loss.
-            if (state%contact(i, j) /= contact_stick) rows(1, j) = rows(1, j) + friction_loss(law, a, slope, &
-               state%force(i, j), state%rubbing(i, :, j), rubbing, fields%slip(i, :, j))
+            if (state%contact(i, j) /= contact_stick) then
+               before = state%rubbing(i, :, j)
+               slip = fields%slip(i, :, j)
+               rows(1, j) = rows(1, j) + friction_loss(law, a, slope, state%force(i, j), before, rubbing, slip)
+            end if
             state%rubbing(i, :, j) = rubbing
             state%force(i, j) = force
          end do

@@ -1,7 +1,7 @@
 !> A summary of a result as text.
 !>
-!> If the run is not finished, the text attribute `outcome` of the file states why it ended. The warnings
-!> of the input and of the run follow.
+!> If the run is not finished, the text attribute `outcome` of the file states why it ended, if the run could still
+!> write it. The warnings of the input and of the run follow.
 module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
@@ -188,7 +188,9 @@ contains
       end if
       if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
          call file%read_attribute('/', 'outcome', outcome)
-         if (outcome == 'running') outcome = 'still running, or killed'//row_note(file)
+         ! A run that a full disk has ended cannot write to its result, just as one that was killed.
+         if (outcome == 'running') outcome = 'not recorded: the run continues, or was killed, or could not write '// &
+            'its result, as on a full disk'//row_note(file)
          text = text//'outcome     '//in_one_line(outcome, 400)//nl
       end if
       call add_warnings(file, 'warnings', text)
@@ -208,7 +210,7 @@ contains
       call file%read('/history/seconds', seconds, error)
       if (allocated(error)) return
       if (size(seconds) == 0) return
-      note = ': the last row took '//to_text(real(nint(1e3_dp*seconds(size(seconds))), dp)*1e-3_dp)// &
+      note = '; the last row took '//to_text(real(nint(1e3_dp*seconds(size(seconds))), dp)*1e-3_dp)// &
          ' s; check whether rows are being added'
    end function row_note
 

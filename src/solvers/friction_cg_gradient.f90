@@ -66,16 +66,17 @@ contains
       type(friction_gradient_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
       real(dp), intent(in) :: alpha
-      real(dp) :: slope(2), r(2), s, t(2)
+      real(dp) :: slope(2), slip(2), r(2), s, t(2)
       integer :: i, j
 
       !$omp parallel do default(none) shared(self, problem, alpha) &
-      !$omp private(i, j, slope, r, s, t) num_threads(problem%threads)
+      !$omp private(i, j, slope, slip, r, s, t) num_threads(problem%threads)
       do j = 1, problem%rows
          do i = 1, problem%width
             if (problem%work%contact(i, j) == contact_open) cycle
             slope = problem%slope_at(i, j)
-            r = problem%law%slip_along_slope(slope, problem%work%slip(i, :, j))
+            slip = problem%work%slip(i, :, j)
+            r = problem%law%slip_along_slope(slope, slip)
             t = problem%work%traction(i, :, j) + alpha*r
             call problem%place_on_bound(i, j, 1.0_dp, t, s)
             self%slip(i, :, j) = r
@@ -92,17 +93,17 @@ contains
       real(dp), intent(in) :: first_alpha              !! if the step gives no information
       real(dp) :: alpha
       real(dp), allocatable :: rows(:, :)              !! s.s, s.y, y.y
-      real(dp) :: s(2), y(2), products(3), shortest, longest
+      real(dp) :: s(2), slip(2), y(2), products(3), shortest, longest
       integer :: i, j
 
       allocate (rows(3, problem%rows), source=0.0_dp)
-      !$omp parallel do default(none) shared(self, problem, rows) private(i, j, s, y) &
+      !$omp parallel do default(none) shared(self, problem, rows) private(i, j, s, slip, y) &
       !$omp num_threads(problem%threads)
       do j = 1, problem%rows
          do i = 1, problem%width
             if (problem%work%contact(i, j) == contact_open) cycle
-            y = self%slip(i, :, j) &
-               - problem%law%slip_along_slope(problem%slope_at(i, j), problem%work%slip(i, :, j))
+            slip = problem%work%slip(i, :, j)
+            y = self%slip(i, :, j) - problem%law%slip_along_slope(problem%slope_at(i, j), slip)
             s = self%step(i, :, j)
             rows(1, j) = rows(1, j) + s(1)**2 + s(2)**2
             rows(2, j) = rows(2, j) + s(1)*y(1) + s(2)*y(2)

@@ -154,11 +154,12 @@ contains
       integer, intent(in) :: i, j
       real(dp), intent(out) :: d(2)          !! Pa
       real(dp), intent(out) :: r(2), g(2)    !! m
-      real(dp) :: slope(2), dd
+      real(dp) :: slope(2), slip(2), dd
 
       slope = problem%slope_at(i, j)
       d = problem%work%traction(i, :, j) - problem%law%normal_traction(problem%pressure_at(i, j), slope)
-      r = problem%law%slip_along_slope(slope, problem%work%slip(i, :, j))
+      slip = problem%work%slip(i, :, j)
+      r = problem%law%slip_along_slope(slope, slip)
       g = r
       if (problem%work%contact(i, j) /= contact_slip) return
       dd = d(1)**2 + d(2)**2

@@ -230,9 +230,10 @@ contains
       real(dp), intent(inout) :: t(2)              !! Pa
       real(dp), intent(inout) :: limit             !! of s below which it is put on its bound
       integer, intent(inout) :: foreseen           !! points that start so
-      real(dp) :: slip(2), length
+      real(dp) :: r(2), slip(2), length
 
-      slip = self%fields%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), self%work%slip(i, :, j))
+      r = self%work%slip(i, :, j)
+      slip = self%fields%slip_unit*self%law%slip_along_slope(self%slope_at(i, j), r)
       length = sqrt(slip(1)**2 + slip(2)**2)       ! not norm2, whose rounding depends on the size of the numbers
       if (length <= far*self%compliance*self%work%site(i, 4, j)) return
       t = self%law%normal_traction(self%pressure_at(i, j), self%slope_at(i, j)) &

@@ -294,12 +294,13 @@ contains
       real(dp), intent(in) :: pressure                 !! Pa
       real(dp), intent(in) :: slope(2)                 !! of the road
       real(dp), intent(in) :: slip(2)                  !! m
-      real(dp) :: share
+      real(dp) :: share, traction(2)
 
+      traction = state%t(i, :, j)
       state%residual(i, 1, j) = (distance - state%level - self%rules%gap_of(state%s(i, j)))/self%unit_length
       share = self%rules%share_of(self%width(i, j), state%s(i, j))
       state%residual(i, 2:3, j) = self%rules%traction_error(share, pressure, merge(slope, 0.0_dp, self%rules%law%slope_effect), &
-         slip, state%t(i, :, j))/self%unit_traction
+         slip, traction)/self%unit_traction
    end subroutine cell_residual
 
    !> Sum the residuals of all cells, and compute that of the load: of the mean pressure, or of the level if it is given.

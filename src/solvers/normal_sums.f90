@@ -66,7 +66,7 @@ contains
       real(dp) :: t(2)
 
       t = totals_of([rows%above, rows%cells], 2)
-      sums = trial_sums_type(above=t(1), cells=t(2), least=least_of_rows(rows%least))
+      sums = trial_sums_type(above=t(1), cells=t(2), least=least_of_rows([rows%least]))
    end function total_trial
 
    !> Sums of a step over the grid.
@@ -87,7 +87,7 @@ contains
 
       t = totals_of([rows%load, rows%work, rows%touched, rows%cells, rows%distance], 5)
       sums = state_sums_type(load=t(1), work=t(2), touched=t(3), cells=t(4), distance=t(5), &
-         least=least_of_rows(rows%least))
+         least=least_of_rows([rows%least]))
    end function total_state
 
    !> Totals of several sums per row, which lie one after the other.

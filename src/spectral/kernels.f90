@@ -163,19 +163,21 @@ contains
       integer, intent(in) :: first, j                  !! not negative
       real(dp), contiguous, intent(out) :: a(first:, :)   !! [wave numbers along x, 1 or 3], m/Pa
       real(dp) :: qx(first:first + size(a, 1) - 1)
-      integer :: i, start
+      integer :: i
+      logical :: has_mean
 
       if (size(a, 1) == 0) return
       do i = first, ubound(a, 1)
          qx(i) = 2.0_dp*pi*(i/grid%lx)
       end do
-      start = first
-      if (first == 0 .and. j == 0) then
-         a(0, :) = self%mean_mode
-         if (self%components > 1) a(0, 3) = 0.0_dp
-         start = 1
-      end if
-      call self%wave(qx(start:), 2.0_dp*pi*(j/grid%ly), a(start:, :))
+      ! The zero wave number takes part as that of the longest wave, and its A is replaced afterwards. The other ones
+      ! alone would not be contiguous, and would be copied.
+      has_mean = first == 0 .and. j == 0
+      if (has_mean) qx(0) = 2.0_dp*pi/grid%lx
+      call self%wave(qx, 2.0_dp*pi*(j/grid%ly), a)
+      if (.not. has_mean) return
+      a(0, :) = self%mean_mode
+      if (self%components > 1) a(0, 3) = 0.0_dp
    end subroutine grid_row
 
    !> Stiffness of a normal kernel for the longest wave of a grid.

@@ -5,6 +5,8 @@
 !> repetition use the same plans. Otherwise the planner's estimate is used, which never varies.
 !> The files are written only if there are new plans; plans that other programs have added since are kept.
 !> If several processes run a case, the first one measures and writes, and the others receive its plans.
+!> A name in the folder that is no regular file, such as a link to a device, could be read for ever. It is left as it
+!> is, and so is a file that is much too large; plans are then estimated, and `wisdom_warning` gives the reason.
 !> The folder is $XDG_CACHE_HOME/asperity or $HOME/.cache/asperity.
 module wisdom
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_null_char, c_ptr, c_size_t
@@ -13,17 +15,22 @@ module wisdom
       fftwf_export_wisdom_to_filename, fftwf_export_wisdom_to_string, fftwf_import_wisdom_from_filename, &
       fftwf_import_wisdom_from_string
    use asperity_parallel, only : is_first_process, process_count, share
+   use asperity_precision, only : int64
+   use file_kind, only : is_other_than_file
    implicit none
    private
 
-   public :: planning_flag, save_wisdom, share_wisdom
+   public :: planning_flag, save_wisdom, share_wisdom, wisdom_warning
 
    integer, parameter, public :: from_memory = 1     !! only plans that are already known
    integer, parameter, public :: from_measuring = 2  !! measure if no plan is known
 
+   integer(int64), parameter :: largest_file = 64000000_int64   !! bytes; a thousand plans take about 1e5
+
    logical :: started = .false.
    logical :: kept = .false.
    character(:), allocatable :: folder
+   character(:), allocatable :: fault                !! of a file of wisdom; not allocated if there is none
 
    interface
       integer(c_int) function c_mkdir(path, mode) bind(c, name='mkdir')
@@ -71,19 +78,46 @@ contains
          call find_folder()
          kept = len(folder) > 0
          if (kept) kept = c_access(folder//c_null_char, writable) == 0
-         if (kept) call read_wisdom()
+         if (kept) call read_wisdom(usable=kept)
       end if
       flag = fftw_estimate
       if (kept) flag = merge(ior(fftw_measure, fftw_wisdom_only), fftw_measure, attempt == from_memory)
    end function planning_flag
 
-   !> Add the wisdom of the files to that of this process.
-   subroutine read_wisdom()
+   !> Add the wisdom of the files to that of this process, unless one of them cannot be used.
+   subroutine read_wisdom(usable)
+      logical, intent(out) :: usable           !! the files may be read and replaced
       integer(c_int) :: status
 
+      call check_file(folder//'/fftw')
+      call check_file(folder//'/fftwf')
+      usable = .not. allocated(fault)
+      if (.not. usable) return
       status = fftw_import_wisdom_from_filename(folder//'/fftw'//c_null_char)
       status = fftwf_import_wisdom_from_filename(folder//'/fftwf'//c_null_char)
    end subroutine read_wisdom
+
+   !> Keep the fault of a file of wisdom, if it has one. There may be no such file yet.
+   subroutine check_file(path)
+      character(*), intent(in) :: path
+      integer(int64) :: bytes
+
+      inquire (file=path, size=bytes)
+      if (is_other_than_file(path)) then
+         fault = path//': is no regular file'
+      else if (bytes > largest_file) then
+         fault = path//': is larger than 64 MB'
+      end if
+   end subroutine check_file
+
+   !> A line about a file that cannot be used, or '' if there is none.
+   function wisdom_warning() result(line)
+      character(:), allocatable :: line
+
+      line = ''
+      if (allocated(fault)) line = fault//', and is ignored. FFTW''s plans are estimated, which may make the '// &
+         'transforms slower; if it is removed, they are measured and kept'
+   end function wisdom_warning
 
    !> Write the wisdom to the files. A failure is ignored, because only time is lost. This must be called inside
    !> the critical section `fftw_planner`, after plans from measuring.
@@ -91,9 +125,12 @@ contains
       integer(c_int) :: status
       character(16) :: process
       character(:), allocatable :: temporary
+      logical :: usable
 
       if (.not. (kept .and. is_first_process())) return
-      call read_wisdom()
+      ! `kept` remains true if a file has become unusable since, because the plans of a run must be found in one way.
+      call read_wisdom(usable)
+      if (.not. usable) return
       write (process, '(i0)') c_getpid()
       temporary = folder//'/new'//trim(process)//c_null_char
       if (fftw_export_wisdom_to_filename(temporary) /= 0) then

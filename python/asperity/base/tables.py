@@ -38,10 +38,11 @@ def text_lines(path: Path) -> list[tuple[int, str]]:
     ValueError
         If it is not a text file, or has no lines left.
     """
-    kept = [(at, line) for at, line in enumerate(text_of(path).splitlines(), 1)
+    text = text_of(path)
+    kept = [(at, line) for at, line in enumerate(text.splitlines(), 1)
             if line.strip() and not is_comment(line)]
     if not kept:
-        raise ValueError(f"{path}: is empty")
+        raise ValueError(f"{path}: {'holds only comments' if text.strip() else 'is empty'}")
     return kept
 
 

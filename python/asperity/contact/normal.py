@@ -108,7 +108,9 @@ def solve_normal(
     force : float, optional
         Normal force, N.
     displacement : float, optional
-        Approach, counted from the first touch, m.
+        Approach, counted from the first touch, m. At 0 and below nothing touches, and the pressure
+        is zero. With ``'periodic'`` it must leave a mean gap, because beyond full contact it does
+        not determine the pressure.
     boundary : str
         'periodic' or 'free'.
     tolerance : float
@@ -157,7 +159,7 @@ def solve_normal(
     tolerance = number("tolerance", tolerance, 0.0, 1.0, low_open=True, high_open=True)
     steps = whole("max_iterations", max_iterations)
     control, load = exactly_one(pressure=pressure, force=force, displacement=displacement)
-    target = positive(control, load)
+    target = number(control, load) if control == "displacement" else positive(control, load)
     top = float(array.max())
     if control == "displacement":
         target -= top

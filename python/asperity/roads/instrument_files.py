@@ -100,7 +100,10 @@ def _open(path: Path) -> Any:
         except ValueError as fault:
             if reader.format() != "hgt":
                 raise
-            raise OSError(f"{path}: is of no known format: {_reason(fault)}") from None
+            reason = _reason(fault).removeprefix(f"{path}: ")
+            if reason == "holds only comments":  # the file is text without any heights
+                raise
+            raise OSError(f"{path}: is of no known format: {reason}") from None
         finally:
             reader.close()
         return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from html import escape
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from ..results import open_result
 from ..results.curve_remarks import marks_of
 from .page_parts import colour_scales, fill_page, page_file, page_json
 from .report_data import blocks, now, packed
-from .style import typeset
+from .style import COLOURS, distinct_colours, typeset
 
 if TYPE_CHECKING:
     from ..results.friction_curve import FrictionCurve
@@ -72,7 +73,7 @@ def curve_page(curve: FrictionCurve) -> str:
         "version": escape(version()),
         "title": escape(title),
         "subtitle": escape(_subtitle(curve)),
-        "style": page_file("report.css"),
+        "style": "\n".join([page_file("report.css"), *_colour_rules(_numbers_of_curves(curve))]),
         "links": "\n".join(f'<a href="#{key}-part">{head}</a>' for key, head, _ in sections),
         "notes": _notes(curve),
         "tiles": "",
@@ -84,6 +85,37 @@ def curve_page(curve: FrictionCurve) -> str:
         "script": "\n".join(page_file(name) for name in SCRIPTS),
     }
     return fill_page(parts)
+
+
+def _numbers_of_curves(curve: FrictionCurve) -> list[int]:
+    """Return how many curves a chart can have that are more than the style sheet has colours for.
+
+    A chart is drawn against one axis. Each of the other two shows all its values or one of them.
+    """
+    sizes = [curve.pressure.size, curve.temperature.size, curve.speed.size]
+    found = set(sizes) | {a * b for a, b in combinations(sizes, 2)}
+    return sorted(count for count in found if count > len(COLOURS))
+
+
+def _colour_rules(counts: list[int]) -> list[str]:
+    """Return style rules for more curves than the palette has colours.
+
+    The colour of curve i of n has the name n-i. In the light theme and in print it is that of the
+    picture of the curve.
+    """
+    names = [f"{count}-{i}" for count in counts for i in range(count)]
+    if not names:
+        return []
+    light, dark = ("".join(f"--c{name}:{colour};" for name, colour in zip(
+        names, (colour for count in counts for colour in distinct_colours(count, dark=theme)),
+        strict=True)) for theme in (False, True))
+    return [f":root{{{light}}}",
+            f'@media (prefers-color-scheme: dark){{:root:not([data-theme="light"]){{{dark}}}}}',
+            f':root[data-theme="dark"]{{{dark}}}',
+            '@media print{:root,:root:not([data-theme="light"]),:root[data-theme="dark"]'
+            f"{{{light}}}}}",
+            *(f".stroke{name}{{stroke:var(--c{name})}}.fill{name}{{fill:var(--c{name})}}"
+              for name in names)]
 
 
 def _subtitle(curve: FrictionCurve) -> str:

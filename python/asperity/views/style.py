@@ -179,17 +179,18 @@ def axis_text(label: str, unit: str) -> str:
     return f"{text} ({unit})" if unit else text
 
 
-def distinct_colours(count: int) -> list[str]:
+def distinct_colours(count: int, *, dark: bool = False) -> list[str]:
     """Return a colour for each of some curves.
 
     If there are more curves than colours in the palette, they are equally spaced on a scale whose
-    lightness increases, so that no two curves have the same colour.
+    lightness increases, so that no two curves have the same colour. The end of the scale that
+    would not be seen on the paper, light or dark, is left out.
     """
     if count <= len(COLOURS):
         return list(COLOURS[:count])
     import matplotlib as mpl  # here, because commands that draw nothing must not wait for it
 
-    steps = np.linspace(0.0, 0.92, count)  # the lightest colours would not be seen on white paper
+    steps = np.linspace(0.25, 1.0, count) if dark else np.linspace(0.0, 0.92, count)
     return [mpl.colors.to_hex(colour) for colour in mpl.colormaps["viridis"](steps)]
 
 

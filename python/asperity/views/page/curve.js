@@ -51,12 +51,15 @@ function xOf(at) {
   return data.a_t[at.temperature] * data.axes.speed[at.speed];
 }
 
+/** The colours of the style sheet for any number of curves; it has others for each larger number. */
+const PALETTE = 7;
+
 /** A line of a chart for each curve. */
 function lines(name, more = {}) {
   const many = curves();
   return many.map((points, number) => ({
     label: [more.label, words(points[0], axisX())].filter(Boolean).join(" ") || data.names[name],
-    colour: number % 7, dash: more.dash || "", x: points.map(xOf),
+    colour: many.length > PALETTE ? `${many.length}-${number}` : number, dash: more.dash || "", x: points.map(xOf),
     y: points.map((at) => valueAt(name, at)),
     low: more.band ? points.map((at) => valueAt(`${name}_low`, at)) : null,
     high: more.band ? points.map((at) => valueAt(`${name}_high`, at)) : null,
