@@ -14,6 +14,7 @@ program main
    use test_checkpoint, only : run_checkpoint
    use test_chunk_writer, only : run_chunk_writer
    use test_coarse_start, only : run_coarse_start
+   use test_contact_runs, only : run_contact_runs
    use test_coupled_passes, only : run_coupled_passes
    use test_joint_step, only : run_joint_step
    use test_coupled_runs, only : run_coupled_runs
@@ -85,6 +86,7 @@ program main
          suite_type('proposal', run_proposal), &
          suite_type('simulation_sliding', run_simulation_sliding), &
          suite_type('steady', run_steady), &
+         suite_type('contact_runs', run_contact_runs), &
          suite_type('coupled_passes', run_coupled_passes), &
          suite_type('joint_step', run_joint_step), &
          suite_type('coupled_runs', run_coupled_runs), &

@@ -61,6 +61,7 @@ contains
       if (selected('block_dragged_into_full_slip_and_back')) &
          call block_dragged_into_full_slip_and_back()
       if (selected('two_threads_agree_to_round_off')) call two_threads_agree_to_round_off()
+      if (selected('solver_serves_contacts_of_any_size')) call solver_serves_contacts_of_any_size()
    end subroutine run_friction_cg
 
    !> Prepare fields, operator and solver.
@@ -993,5 +994,52 @@ contains
       end do
       call set_threads(threads)
    end subroutine two_threads_agree_to_round_off
+
+   !> A solver that has solved larger and smaller contacts gives the same solution as a new one: its fields have another
+   !> length for each of them, from no contact to full contact, with and without a traction of the past.
+   subroutine solver_serves_contacts_of_any_size()
+      real(dp), parameter :: thresholds(6) = [0.9_dp, -0.4_dp, -9.0_dp, 2.0_dp, 99.0_dp, 0.3_dp]
+      type(case_type) :: kept, new
+      real(dp), allocatable :: past(:, :, :)
+      character(:), allocatable :: what
+      integer :: k
+
+      call new_case(kept, 60, 32, 1.0_dp, 0.8_dp, boundary_periodic, 0.4_dp, 0.5_dp)
+      allocate (past(60, 2, 32))
+      do k = 1, size(thresholds)
+         what = 'contact '//achar(iachar('0') + k)
+         call new_case(new, 60, 32, 1.0_dp, 0.8_dp, boundary_periodic, 0.4_dp, 0.5_dp)
+         call set_rough(new, 10 + k, 0.1_dp, thresholds(k))
+         new%drive_x = 0.03_dp
+         new%drive_y = 0.01_dp
+         new%law = new_friction_law('coulomb', 0.3_dp, 0.0_dp, 0.0_dp, .true., .true.)
+         kept%p = new%p
+         kept%hx = new%hx
+         kept%hy = new%hy
+         kept%drive_x = new%drive_x
+         kept%drive_y = new%drive_y
+         kept%law = new%law
+         kept%tx = 0.0_dp
+         kept%ty = 0.0_dp
+         kept%contact = contact_stick
+         past(:, 1, :) = 0.1_dp*k*new%p
+         past(:, 2, :) = 0.0_dp
+         if (mod(k, 2) == 0) then
+            call solve_case(kept, past)
+            call solve_case(new, past)
+         else
+            call solve_case(kept)
+            call solve_case(new)
+         end if
+         call check_that(new%result%converged, what//': converged')
+         call check_close(maxval(hypot(kept%tx - new%tx, kept%ty - new%ty)), 0.0_dp, &
+            1e-12_dp*maxval(hypot(new%tx, new%ty)), what//': the same traction')
+         call check_close(maxval(hypot(kept%rx - new%rx, kept%ry - new%ry)), 0.0_dp, &
+            1e-12_dp*maxval(hypot(new%rx, new%ry)), what//': the same slip')
+         call check_that(all(kept%contact == new%contact), what//': the same states')
+         call end_case(new)
+      end do
+      call end_case(kept)
+   end subroutine solver_serves_contacts_of_any_size
 
 end module test_friction_cg
