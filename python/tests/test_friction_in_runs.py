@@ -327,3 +327,27 @@ def test_cells_with_little_pressure_are_solved_too(tmp_path: Path) -> None:
         case.write_text(text.format(tolerance=tolerance, file=file))
         losses.append(np.diff(asperity.run(case, quiet=True).history["dissipated_friction"]))
     assert np.abs(losses[0] - losses[1]).max() < 1e-3 * losses[1].max()
+
+
+def test_short_slip_of_a_thick_block(tmp_path: Path) -> None:
+    """Full sliding counts as slip although a step moves the road less than the error that is allowed.
+
+    A block of 20 mm is sheared by 0.5 mm, and the tolerance is 1e-4 of this, twice the motion of the
+    road in a step. The loss is mu times the force times the motion of the road.
+    """
+    case = tmp_path / "slow.nml"
+    case.write_text("""&grid nx = 12, ny = 6, lx = 1e-3 /
+&surface shape = 'sine', amplitude = 2e-5, wavelength = 1e-3 /
+&material shear_modulus = 1e6, thickness = 2e-2 /
+&friction law = 'coulomb', coefficient = 0.5, slope_effect = .false. /
+&phase pressure = 5e4 /
+&phase duration = 1e-2, steps = 10, velocity_x = 1 /
+&phase duration = 1, steps = 40, velocity_x = 1e-6 /
+&solver tolerance = 1e-4, threads = 1 /
+""")
+    history = asperity.run(case, quiet=True).history
+    loss = history["dissipated_friction"]
+    slow = np.flatnonzero(history["phase"] == 3)
+    heat = 0.5 * history["force"][-1] * 1e-6
+    assert loss[-1] - loss[slow[0] - 1] == pytest.approx(heat, rel=0.02)
+    assert np.all(history["stick_area"][slow] == 0)

@@ -8,6 +8,7 @@ import re
 import resource
 import shutil
 import signal
+import subprocess
 from pathlib import Path
 
 import h5py
@@ -199,6 +200,15 @@ def test_other_height_map(program: str, tmp_path: Path) -> None:
     assert "&surface 1: checksum of the height map is" in done.stderr
     write_map(tmp_path, heights)
     assert vc.run(program, case, "--restart").returncode == 0
+
+
+def test_restart_from_another_folder(program: str, tmp_path: Path) -> None:
+    """The path of a height map as the program sees it depends on the folder of its start."""
+    write_map(tmp_path, 4e-6 * np.random.default_rng(1).standard_normal((17, 24)))
+    case = stopped_case(program, tmp_path, "case")
+    done = subprocess.run([program, "run", case.name, "--restart", "--quiet"], cwd=tmp_path,
+                          capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stderr
 
 
 def test_result_of_another_run(program: str, tmp_path: Path) -> None:

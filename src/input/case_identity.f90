@@ -8,7 +8,8 @@ module case_identity
 contains
 
    !> The settings of a case as lines 'group: name = value', without those that do not affect the numbers:
-   !> the title, the output, and the threads.
+   !> the title, the output, and the threads. The names of files with height maps do not matter either, because they
+   !> depend on the folder in which a run is started; the caller compares the checksums of the maps.
    function identity_of(settings) result(lines)
       character(*), intent(in) :: settings       !! of `resolved_input`
       character(:), allocatable :: lines
@@ -38,6 +39,7 @@ contains
          if (equals == 0) cycle
          if (group == '&case' .or. group == '&output') cycle
          if (group == '&solver' .and. index(line, 'threads') == 1) cycle
+         if (group == '&surface' .and. (index(line, 'file ') == 1 .or. index(line, 'dataset ') == 1)) cycle
          note = index(line, ' ! ')
          if (note == 0) note = len(line) + 1
          call add(place//': '//trim(line(:equals - 1))//' = '//trim(adjustl(line(equals + 1:note - 1))))

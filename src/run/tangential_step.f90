@@ -368,7 +368,7 @@ contains
          call book_rest(state, self%law, self%adhesive, pressure, gap, slope_x, slope_y)
          return
       end if
-      call mark_idle(state, self%slip, self%solver%resolved_slip/self%q)
+      call mark_idle(state, self%slip, idle_slip(self))
       products = new_products(material)
       carried = 0.0_dp
       if (state%block%mass > 0.0_dp) then
@@ -394,6 +394,19 @@ contains
       if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%motion/(rubbed%cells*self%dt)
       call copy_field(self%trial, state%displacement)
    end subroutine commit
+
+   !> The longest slip of the step that may be an error, m. While the road moves, it is the error that the last solve has
+   !> left. The error that is allowed is in proportion to the displacements. In a thick block these contain the shear of
+   !> the whole block, and may allow more than the road moves in a step. While the road rests, errors of earlier steps may
+   !> appear as slip, of which the last solve knows nothing.
+   pure function idle_slip(self) result(slip)
+      class(tangential_step_type), intent(in) :: self
+      real(dp) :: slip
+
+      slip = self%solver%allowed_slip/self%q
+      if (norm2(self%motion) > 0.0_dp) &
+         slip = min(slip, max(self%solver%reached_slip/self%q, self%solver%tolerance*norm2(self%motion)))
+   end function idle_slip
 
    !> Compute the mean traction, the fraction of the grid that sticks, and the mean slip of the step.
    subroutine sums(self, state, traction, stick, slip)

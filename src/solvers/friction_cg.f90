@@ -66,7 +66,6 @@ module friction_cg
    !> which is near the round-off). Otherwise it would often end just below the tolerance, with an error of the
    !> friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
-   real(dp), parameter :: idle_slip = 1.0_dp     !! least slip that exceeds the error of a solve, over this error
 
    !> The solver for one operator, kept from solve to solve. A variable of this type must not be copied.
    type :: friction_solver_type
@@ -78,8 +77,9 @@ module friction_cg
       logical :: settle = .true.
       !> Least scale of the residual, in the units of DX': the size of the terms of DX', which may cancel.
       real(dp) :: least_scale = 0.0_dp
-      !> Out: the least slip that exceeds the error of a solve, in the units of DX'.
-      real(dp) :: resolved_slip = 0.0_dp
+      !> Out: the slip that may be an error of a solve, and the one that the last solve has left as an error at most, in
+      !> the units of DX'.
+      real(dp) :: allowed_slip = 0.0_dp, reached_slip = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(friction_pull_type) :: pull           !! prescribed total of T, and the position of the road
       class(friction_method_type), allocatable, private :: method
@@ -161,7 +161,8 @@ contains
 
       call problem%finish()
       result%stopped = self%method%stopped
-      self%resolved_slip = idle_slip*result%required*problem%scale
+      self%allowed_slip = result%required*problem%scale
+      self%reached_slip = problem%residual*problem%scale
       result%residual = problem%residual
       result%load_error = self%pull%missing_part(problem)
       result%reason = reason(self, problem, result)
