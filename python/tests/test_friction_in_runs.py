@@ -330,10 +330,10 @@ def test_cells_with_little_pressure_are_solved_too(tmp_path: Path) -> None:
 
 
 def test_short_slip_of_a_thick_block(tmp_path: Path) -> None:
-    """Full sliding counts as slip although a step moves the road less than the error that is allowed.
+    """Full sliding counts as slip although the road moves less in a step than the allowed error.
 
-    A block of 20 mm is sheared by 0.5 mm, and the tolerance is 1e-4 of this, twice the motion of the
-    road in a step. The loss is mu times the force times the motion of the road.
+    A block of 20 mm is sheared by 0.5 mm, and the tolerance is 1e-4 of this, twice the motion of
+    the road in a step. The loss is mu times the force times the motion of the road.
     """
     case = tmp_path / "slow.nml"
     case.write_text("""&grid nx = 12, ny = 6, lx = 1e-3 /

@@ -1,8 +1,10 @@
-"""Random cases of the campaign of hard steps which an earlier version could not solve."""
+"""Random cases of hard steps which an earlier version could not solve, or solved wrongly."""
 
+import contextlib
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -62,3 +64,48 @@ def test_tolerance_of_the_case_suffices(
     history = asperity.open(tmp_path / "case.h5").history
     for column in ("residual_normal", "residual_tangential", "residual_coupling"):
         assert history[column].max() <= 1e-6, column
+
+
+LENGTH = 3.1112639935298986e-4
+STEEP_ROAD = [  # um
+    [0, -6, -26, -1, -29, 4, -6, -13, 58, -19],
+    [-24, -21, -4, -9, -14, 24, 3, -13, 15, -5],
+    [11, -4, 13, 8, -19, -16, -7, -3, 13, -17],
+    [-14, 0, -18, 3, -5, 18, -5, -25, 4, 10],
+    [-11, -4, -24, -22, 33, 15, 10, 7, 6, 11],
+    [-5, -1, -9, -13, 22, 52, 15, 28, 4, -10],
+    [-14, -8, 28, 6, -15, -17, 6, 6, 47, 0],
+    [1, 10, 7, -13, 9, -21, 9, 11, 5, -8],
+    [-6, -16, 10, 20, -2, -4, -12, -11, 10, -7],
+    [8, -2, -4, -4, 1, 23, -16, 9, -6, -2]
+]
+
+
+def test_cell_without_pressure_does_not_slip_inside_its_bound(tmp_path):
+    """On a slope above 1/coefficient, no traction of a cell without pressure is on its bound.
+
+    The method that solves a step all at once gives such a cell a share of the traction, and an
+    earlier version accepted cells that slipped with it. The step need not converge.
+    """
+    asperity.surface.save(tmp_path / "road.h5", 1e-6 * np.array(STEEP_ROAD), LENGTH, LENGTH)
+    case = tmp_path / "case.nml"
+    case.write_text("""&grid nx = 10, ny = 10, lx = 3.1112639935298986e-4 /
+&surface shape = 'file', file = 'road.h5' /
+&material shear_modulus = 110757.98, thickness = 5.519659554419747e-05, density = 5695499296.8,
+   prony_g = 9608.93, 515676.2, 28282.87, 17002.8, 857595.93, 320269.43,
+   prony_tau = 1.313178794e-4, 2.104907493e-4, 2.4617848e-3, 2.49499e-3, 0.0327485, 0.852182755 /
+&friction law = 'coulomb_orowan', coefficient = 1.370902, shear_strength = 40872.04477 /
+&phase displacement = 2.47653965e-05 /
+&phase duration = 3.032255e-3, steps = 3, velocity_x = 0.01451488, velocity_y = -5.1182356e-3 /
+&phase duration = 0.02816349, steps = 3, velocity_x = 7.4011138e-4, velocity_y = -2.609780e-4 /
+&solver tolerance = 1e-4, time_scheme = 'backward_euler', threads = 1 /
+&output snapshot_every = 1 /
+""")
+    with contextlib.suppress(asperity.NotConverged):
+        asperity.run(case, quiet=True)
+    run = asperity.open(tmp_path / "case.h5")
+    converged = run.snapshots if run.finished else run.snapshots[:-1]
+    assert len(converged) >= 4
+    for state in converged:
+        slips = (state.pressure == 0) & (state.contact == 2)
+        assert not np.any(np.hypot(state.traction_x, state.traction_y)[slips] > 0)

@@ -20,7 +20,7 @@ module asperity_simulation
    use contact_model, only : commit_step, contact_type, new_contact, place_road, solve_normal
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
    use coupling_advice, only : advice_on_passes
-   use full_contact, only : largest_displacement, limit_in_words
+   use field_sums, only : field_mean
    use history_table, only : row_values
    use normal_state, only : reason_undetermined
    use pulled_road, only : guess_road, pull_outcome, place_pulled_road, watch_motion
@@ -338,14 +338,16 @@ contains
       if (outcome%residual <= self%allowed .and. outcome%load_error > self%allowed) self%residual = outcome%load_error
    end subroutine note_outcome
 
-   !> Add to the reason which displacements have a solution. No accuracy would help, so that the residual is not named.
+   !> Add to the reason which displacements have a solution: those that leave a mean gap, because the mean displacement
+   !> of a periodic half-space does not depend on the pressure. No accuracy would help, so that the residual is not named.
    subroutine note_full_contact(self, plan)
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
 
       self%residual = 0.0_dp
       self%reason = trim(self%reason)//'. It is '//to_text(plan%load)//' m and must be below '// &
-         to_text(largest_displacement(self))//limit_in_words
+         to_text(self%summit - field_mean(self%height))//' m, the mean gap at first touch: beyond it the pressure '// &
+         'of a periodic contact is not determined'
    end subroutine note_full_contact
 
    !> One sentence about a row that has not converged. It compares an error with the allowed one only if this error is

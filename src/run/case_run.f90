@@ -14,7 +14,6 @@ module case_run
    use asperity_threads, only : set_threads
    use case_memory, only : memory_needed
    use case_settings, only : case_type
-   use full_contact, only : check_displacements
    use memory_limits, only : need_memory
    use process_agreement, only : agree
    use regular_grid, only : grid_type
@@ -66,7 +65,6 @@ contains
       call check_memory(case, error)
       if (.not. allocated(error)) call new_simulation(self%sim, case, error)
       call agree(error)
-      call check_displacements(self%sim, error)
       if (allocated(error)) return
       if (restart) then
          call resume(self, error)

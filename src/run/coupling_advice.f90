@@ -38,8 +38,9 @@ contains
          advice = 'Allow more passes (with passes = 0 they continue until they settle), or a larger '// &
             'coupling_tolerance'
       else
-         advice = 'A mass (density) may help, shorter steps seldom do; with a larger coupling_tolerance '// &
-            'the run continues, and residual_coupling shows the remaining mismatch'
+         advice = 'A mass (density) may help, shorter steps seldom do; with'
+         if (self%state%tangential%block%mass > 0.0_dp) advice = 'Shorter steps seldom help; with'
+         advice = advice//' a larger coupling_tolerance the run continues, and residual_coupling shows the remaining mismatch'
       end if
    end function advice_on_passes
 

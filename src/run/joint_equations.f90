@@ -235,6 +235,9 @@ contains
          state%level = found%level
          tangential%traction(:, :, :) = found%t
          contact%tangential%share(:, :) = self%rules%share_of(self%width, found%s)
+         ! Other laws have no shares: the last pass proves that a cell that touches without pressure obeys the whole law.
+         if (.not. self%rules%law%jumps_at_edge()) &
+            contact%tangential%share(:, :) = merge(1.0_dp, 0.0_dp, contact%tangential%share > 0.0_dp)
          do j = 1, contact%grid%rows()
             do i = 1, contact%grid%nx
                if (self%rules%law%slope_effect) slope = [self%slope_x(i, j), self%slope_y(i, j)]
