@@ -395,17 +395,18 @@ contains
       call copy_field(self%trial, state%displacement)
    end subroutine commit
 
-   !> The longest slip of the step that may be an error, m. While the road moves, it is the error that the last solve has
-   !> left. The error that is allowed is in proportion to the displacements. In a thick block these contain the shear of
-   !> the whole block, and may allow more than the road moves in a step. While the road rests, errors of earlier steps may
-   !> appear as slip, of which the last solve knows nothing.
+   !> The longest slip of the step that may be an error, m. While the road rests, it is the error that every solve may
+   !> leave, because errors of earlier steps then appear as slip. This error is in proportion to the displacements. In a
+   !> thick block they contain the shear of the whole block, and the error may be longer than the way of the road in a
+   !> step. While the road moves, the error that the last solve has really left therefore counts.
    pure function idle_slip(self) result(slip)
       class(tangential_step_type), intent(in) :: self
       real(dp) :: slip
 
       slip = self%solver%allowed_slip/self%q
-      if (norm2(self%motion) > 0.0_dp) &
-         slip = min(slip, max(self%solver%reached_slip/self%q, self%solver%tolerance*norm2(self%motion)))
+      associate (way => norm2(self%motion), reached => self%solver%reached_slip/self%q)
+         if (way > reached) slip = min(slip, max(reached, self%solver%tolerance*way))
+      end associate
    end function idle_slip
 
    !> Compute the mean traction, the fraction of the grid that sticks, and the mean slip of the step.

@@ -23,12 +23,8 @@ module contact_runs
       integer, allocatable :: number(:)          !! [rows] of runs
       integer, allocatable :: ends(:, :, :)      !! [2, most runs, rows] the first and the last cell of each run
    contains
-      generic :: gather => gather_values, gather_states
-      generic :: spread => spread_values, spread_states
-      procedure, private :: gather_values
-      procedure, private :: gather_states
-      procedure, private :: spread_values
-      procedure, private :: spread_states
+      procedure :: gather
+      procedure :: spread
    end type contact_runs_type
 
 contains
@@ -89,7 +85,7 @@ contains
    end subroutine list_runs
 
    !> Copy the cells in contact of a whole row to a row of contact, and fill this up with zeros.
-   pure subroutine gather_values(self, j, whole, row)
+   pure subroutine gather(self, j, whole, row)
       class(contact_runs_type), intent(in) :: self
       integer, intent(in) :: j
       real(dp), intent(in), contiguous :: whole(:)     !! [nx]
@@ -105,29 +101,10 @@ contains
          k = k + self%ends(2, n, j) - first
       end do
       row(k + 1:) = 0.0_dp
-   end subroutine gather_values
-
-   !> Copy the states of the cells in contact of a whole row, and fill the row up with zeros.
-   pure subroutine gather_states(self, j, whole, row)
-      class(contact_runs_type), intent(in) :: self
-      integer, intent(in) :: j
-      integer(int8), intent(in), contiguous :: whole(:)     !! [nx]
-      integer(int8), intent(out), contiguous :: row(:)      !! [width]
-      integer :: first, i, k, n
-
-      k = 0
-      do n = 1, self%number(j)
-         first = self%ends(1, n, j) - 1
-         do i = 1, self%ends(2, n, j) - first
-            row(k + i) = whole(first + i)
-         end do
-         k = k + self%ends(2, n, j) - first
-      end do
-      row(k + 1:) = 0_int8
-   end subroutine gather_states
+   end subroutine gather
 
    !> Copy a row of contact to the cells in contact of a whole row, whose other cells become 0.
-   pure subroutine spread_values(self, j, row, whole)
+   pure subroutine spread(self, j, row, whole)
       class(contact_runs_type), intent(in) :: self
       integer, intent(in) :: j
       real(dp), intent(in), contiguous :: row(:)       !! [width]
@@ -146,25 +123,6 @@ contains
          k = k + done - first
       end do
       whole(done + 1:) = 0.0_dp
-   end subroutine spread_values
-
-   !> Copy the states of a row of contact to the cells in contact of a whole row, whose other cells become 0.
-   pure subroutine spread_states(self, j, row, whole)
-      class(contact_runs_type), intent(in) :: self
-      integer, intent(in) :: j
-      integer(int8), intent(in), contiguous :: row(:)       !! [width]
-      integer(int8), intent(out), contiguous :: whole(:)    !! [nx]
-      integer :: first, i, k, n
-
-      k = 0
-      whole(:) = 0_int8
-      do n = 1, self%number(j)
-         first = self%ends(1, n, j) - 1
-         do i = 1, self%ends(2, n, j) - first
-            whole(first + i) = row(k + i)
-         end do
-         k = k + self%ends(2, n, j) - first
-      end do
-   end subroutine spread_states
+   end subroutine spread
 
 end module contact_runs

@@ -63,7 +63,7 @@ module friction_cg
    !> separately. Below this value, that would cost iterations; above it, it saves them.
    real(dp), parameter :: thick = 0.2_dp
    !> A solve that starts along an expected slip continues to `aim` times its tolerance (but not below `resolved`,
-   !> which is near the round-off). Otherwise it would often end just below the tolerance, with an error of the
+   !> a residual near the round-off). Otherwise it would often end just below the tolerance, with an error of the
    !> friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
 
@@ -162,7 +162,7 @@ contains
       call problem%finish()
       result%stopped = self%method%stopped
       self%allowed_slip = result%required*problem%scale
-      self%reached_slip = problem%residual*problem%scale
+      self%reached_slip = max(problem%residual, resolved)*problem%scale
       result%residual = problem%residual
       result%load_error = self%pull%missing_part(problem)
       result%reason = reason(self, problem, result)

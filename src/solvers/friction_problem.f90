@@ -152,10 +152,12 @@ contains
    subroutine gather_row(self, j)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
+      real(dp) :: state(self%width)
       integer :: c
 
       associate (fields => self%fields, work => self%work, runs => self%work%runs)
-         call runs%gather(j, fields%contact(:, j), work%contact(:, j))
+         call runs%gather(j, real(fields%contact(:, j), dp), state)
+         work%contact(:, j) = int(state, int8)
          call runs%gather(j, fields%pressure(:, j), work%site(:, 1, j))
          if (self%law%slope_effect) then
             call runs%gather(j, fields%slope_x(:, j), work%site(:, 2, j))
@@ -209,11 +211,13 @@ contains
    !> Return T and the states to the caller.
    subroutine finish(self)
       class(friction_problem_type), intent(in) :: self
+      real(dp) :: state(self%nx)
       integer :: c, j
 
-      !$omp parallel do default(none) shared(self) private(c, j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self) private(c, j, state) num_threads(self%threads)
       do j = 1, self%rows
-         call self%work%runs%spread(j, self%work%contact(:, j), self%fields%contact(:, j))
+         call self%work%runs%spread(j, real(self%work%contact(:, j), dp), state)
+         self%fields%contact(:, j) = int(state, int8)
          do c = 1, 2
             call self%work%runs%spread(j, self%work%traction(:, c, j), self%fields%traction(:, c, j))
          end do
