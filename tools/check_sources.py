@@ -3,6 +3,8 @@
 Neither build notices a change of a file that a source includes. The line of the include therefore
 contains a checksum of that file, and changes with it.
 
+A module has the name of its file, and no description begins in a way that FORD misreads.
+
 With --update, the lists of meson.build and the checksums are corrected.
 """
 
@@ -67,3 +69,10 @@ for name in lists["sources = files"]:
             faults.append(f"{name} holds an old state of {included}, now {state}")
 if faults:
     sys.exit("\n".join([*faults, "python tools/check_sources.py --update corrects it"]))
+
+# FORD takes a first word with a colon for the name of an entry of its own, and leaves out the rest.
+opening = re.compile(r"(?m)^(?! *!>).*\n *!> *(\w+:(?: .*)?)$")
+faults = [f"{name}: a description must not begin with a word and a colon: {line}"
+          for name in lists["sources = files"] for line in opening.findall((root / name).read_text())]
+if faults:
+    sys.exit("\n".join(faults))

@@ -77,8 +77,8 @@ module friction_cg
       logical :: settle = .true.
       !> Least scale of the residual, in the units of DX': the size of the terms of DX', which may cancel.
       real(dp) :: least_scale = 0.0_dp
-      !> Out: the slip that may be an error of a solve, and the one that the last solve has left as an error at most, in
-      !> the units of DX'.
+      !> The slip that may be an error of a solve, and the one that the last solve has left as an error at most, in the
+      !> units of DX'. Both are set by `solve`.
       real(dp) :: allowed_slip = 0.0_dp, reached_slip = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
       type(friction_pull_type) :: pull           !! prescribed total of T, and the position of the road
