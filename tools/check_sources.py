@@ -73,6 +73,7 @@ if faults:
 # FORD takes a first word with a colon for the name of an entry of its own, and leaves out the rest.
 opening = re.compile(r"(?m)^(?! *!>).*\n *!> *(\w+:(?: .*)?)$")
 faults = [f"{name}: a description must not begin with a word and a colon: {line}"
-          for name in lists["sources = files"] for line in opening.findall((root / name).read_text())]
+          for name in lists["sources = files"]
+          for line in opening.findall((root / name).read_text())]
 if faults:
     sys.exit("\n".join(faults))

@@ -9,6 +9,8 @@ settled    exit status 0, and `residual_coupling` of all rows is within the tole
 reported   exit status 4: the run says that a solver or the passes did not converge
 silent     anything else, which is a fault of the program
 
+With --slopes 0.5 1.5 --ratios 0.2 5 the roads are steeper, and the cells oblong.
+
 usage: python tools/coupled_campaign.py [--count 500] [--seed 1] [--jobs 1] [--program asperity]
 """
 
@@ -29,15 +31,17 @@ LENGTH = 1e-3
 MODULUS = 1e6
 SPEED = 0.1
 TOLERANCE = 1e-6
+Pair = tuple[float, float]
+SLOPES, SQUARE = (0.05, 0.6), (1.0, 1.0)
 
 
-def road(rng: np.random.Generator, nx: int, ny: int, dx: float, slope: float,
+def road(rng: np.random.Generator, nx: int, ny: int, dx: float, dy: float, slope: float,
          kind: str) -> np.ndarray:
     """Return periodic heights, m, of shape (ny, nx), with an rms slope."""
     fx, fy = np.fft.fftfreq(nx) * nx, np.fft.fftfreq(ny) * ny
-    wx, wy = fx[None, :] / (nx * dx), fy[:, None] / (ny * dx)
+    wx, wy = fx[None, :] / (nx * dx), fy[:, None] / (ny * dy)
     wave = np.hypot(wx, wy)
-    shortest = 1 / (rng.choice([5.0, 6.0, 8.0]) * dx)
+    shortest = 1 / (rng.choice([5.0, 6.0, 8.0]) * max(dx, dy))
     allowed = (wave > 0) & (wave <= shortest)
     if kind == "self-affine":
         amplitude = np.where(allowed, np.where(allowed, wave, 1.0) ** -1.8, 0.0)
@@ -52,20 +56,26 @@ def road(rng: np.random.Generator, nx: int, ny: int, dx: float, slope: float,
     return height * slope / np.sqrt(square)
 
 
-def make_case(seed: int, folder: Path) -> tuple[str, dict[str, Any]]:
-    """Return the namelist of a random case, and a description of it in words."""
+def make_case(seed: int, folder: Path, slopes: Pair = SLOPES, ratios: Pair = SQUARE
+              ) -> tuple[str, dict[str, Any]]:
+    """Return the namelist of a random case, and a description of it in words.
+
+    The rms slope is between the two `slopes`, and the ratio of the sides of a cell, dy/dx, between
+    the two `ratios`.
+    """
     rng = np.random.default_rng(seed)
     nx = int(rng.choice([24, 32, 40]))
     ny = int(rng.choice([nx, nx // 2, 20]))
     dx = LENGTH / nx
-    slope, mu = rng.uniform(0.05, 0.6), rng.uniform(0.1, 1.0)
+    dy = dx * float(np.exp(np.random.default_rng(seed).uniform(*np.log(ratios))))
+    slope, mu = rng.uniform(*slopes), rng.uniform(0.1, 1.0)
     free = rng.random() < 0.25
     kind = str(rng.choice(["self-affine", "few waves"]))
-    height = road(rng, nx, ny, dx, slope, kind)
+    height = road(rng, nx, ny, dx, dy, slope, kind)
     if free:
-        x, y = (np.arange(nx) + 0.5) * dx - nx * dx / 2, (np.arange(ny) + 0.5) * dx - ny * dx / 2
+        x, y = (np.arange(nx) + 0.5) * dx - nx * dx / 2, (np.arange(ny) + 0.5) * dy - ny * dy / 2
         height = 0.5 * height - (x[None, :] ** 2 / (0.9 * nx * dx)
-                                 + y[:, None] ** 2 / (0.9 * ny * dx))
+                                 + y[:, None] ** 2 / (0.9 * ny * dy))
     arms = int(rng.choice([0, 1, 2, 5]))
     thickness = 0.0 if free else float(rng.choice([0, 0.1, 0.5, 2, 10])) * LENGTH
     density = 0.0
@@ -98,7 +108,7 @@ def make_case(seed: int, folder: Path) -> tuple[str, dict[str, Any]]:
         friction += f", shear_strength = {mu * pressure * 3:.6g}"
     if rng.random() < 0.1:
         friction += ", slope_effect = .false."
-    text = (f"&grid nx = {nx}, ny = {ny}, lx = {LENGTH:g}, ly = {ny * dx:.9g}, "
+    text = (f"&grid nx = {nx}, ny = {ny}, lx = {LENGTH:g}, ly = {ny * dy:.9g}, "
             f"boundary = '{'free' if free else 'periodic'}' /\n"
             f"&surface shape = 'file', file = 'road.h5' /\n&material {material} /\n"
             f"&friction {friction} /\n")
@@ -116,17 +126,17 @@ def make_case(seed: int, folder: Path) -> tuple[str, dict[str, Any]]:
              f"max_iterations = 3000 /\n&output file = 'out.h5' /\n")
     about = dict(seed=seed, n=f"{nx}x{ny}", road=kind, slope=round(slope, 2), mu=round(mu, 2),
                  law=law, h=thickness / LENGTH, arms=arms, mass=density > 0, adhesion=adhesive,
-                 boundary="free" if free else "periodic", cells=cells,
+                 boundary="free" if free else "periodic", cells=cells, ratio=round(dy / dx, 2),
                  oblique=angle not in (0.0, 0.5 * np.pi))
     return text, about
 
 
-def try_case(job: tuple[int, str]) -> dict[str, Any]:
+def try_case(job: tuple[int, str], slopes: Pair = SLOPES, ratios: Pair = SQUARE) -> dict[str, Any]:
     """Run one case and return how it ended."""
     seed, program = job
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        text, about = make_case(seed, folder)
+        text, about = make_case(seed, folder, slopes, ratios)
         (folder / "case.nml").write_text(text)
         done = subprocess.run([program, "run", "case.nml", "--quiet"], cwd=folder,
                               capture_output=True, text=True, check=False)
@@ -154,15 +164,20 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--program", default="asperity")
     parser.add_argument("--only", type=int, help="print and run the case of one seed")
+    parser.add_argument("--slopes", type=float, nargs=2, default=SLOPES, metavar=("LEAST", "MOST"),
+                        help="bounds of the rms slope")
+    parser.add_argument("--ratios", type=float, nargs=2, default=SQUARE, metavar=("LEAST", "MOST"),
+                        help="bounds of dy/dx")
     given = parser.parse_args()
+    drawn = tuple(given.slopes), tuple(given.ratios)
     if given.only is not None:
         with tempfile.TemporaryDirectory() as name:
-            print(make_case(given.only, Path(name))[0])
-        print(try_case((given.only, given.program)))
+            print(make_case(given.only, Path(name), *drawn)[0])
+        print(try_case((given.only, given.program), *drawn))
         return 0
     jobs = [(given.seed * 100000 + k, given.program) for k in range(given.count)]
     with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
-        results = list(pool.map(try_case, jobs))
+        results = list(pool.map(lambda job: try_case(job, *drawn), jobs))
     print(Counter(case["end"] for case in results))
     print("transforms:", sum(case.get("ffts", 0) for case in results))
     for group in ("coulomb", "coulomb_orowan", "constant_shear"):

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, Any
 from . import _addresses
 from .base import presenters
 
-# Idle threads must sleep: if they spin, a run becomes ten times slower on a machine that others
-# use. OpenMP reads the variable when its library is loaded, perhaps by another package, so set it
+# Idle threads must soon sleep: if they spin for long, a run becomes ten times slower on a machine
+# that others use. They spin for about as long as it takes to wake them (`app/wait_policy.f90`).
+# OpenMP reads the variables when its library is loaded, perhaps by another package, so set them
 # first.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+if "OMP_WAIT_POLICY" not in os.environ:
+    os.environ["OMP_WAIT_POLICY"] = "passive"
+    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
 
 if TYPE_CHECKING:
     from . import theory

@@ -12,11 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Idle threads must sleep: if they spin, a run becomes ten times slower on a machine that others
-# use. OpenMP reads this variable when its library is loaded, so it must be set before the import
-# below.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-
 from asperity import _core
 
 from .check import choice, no_masked, positive, whole
