@@ -214,7 +214,7 @@ contains
       logical :: solved
       integer :: transforms
 
-      call self%joint%solve(contact, plan, solved, transforms)
+      call self%joint%solve(contact, plan, self%place, solved, transforms)
       self%gap_known = .false.
       tangential%ffts = tangential%ffts + transforms
       overwritten = transforms > 0

@@ -8,6 +8,10 @@
 !>                                      open cells
 !>     mean of P = load                 or the level is given
 !>
+!> On a path of solutions (module `joint_path`) the road is read between an origin and the displacement that T causes; the
+!> part of the state is the position between the two. The slip always follows the whole displacement. At part 0 the road
+!> is read at the origin, as in a pass at this place, and the result of that pass is the solution.
+!>
 !> An evaluation takes six transforms.
 module joint_equations
    use adhesion_potential, only : adhesive_slope
@@ -20,7 +24,7 @@ module joint_equations
    use fft_conv, only : columns_apply, convolution_type, new_convolution
    use friction_law, only : contact_open, contact_slip, contact_stick
    use joint_system, only : joint_state_type, joint_system_type
-   use joint_tiles, only : even, near_values, odd
+   use joint_tiles, only : cell_responses_type, even, near_values, odd
    use regular_grid, only : boundary_periodic
    use rubber_kernels, only : normal_kernel
    implicit none
@@ -39,10 +43,15 @@ module joint_equations
       type(planned_row_type), private :: plan
       real(dp), private :: compliance = 0.0_dp         !! of a cell under its own unit pressure, G = 1, m/Pa
       type(convolution_type), private :: operator      !! A_z, G = 1
+      real(dp), private :: part = 1.0_dp               !! of the last state that was evaluated
+      type(cell_responses_type), private :: whole      !! displacements around a loaded cell, at part 1
+      real(dp), allocatable, private :: origin(:, :, :)       !! of a path, m [nx, 2, rows]
+      real(dp), allocatable, private :: place(:, :, :) !! where the road is read on a path, m [nx, 2, rows]
       real(dp), allocatable, private :: pressure(:, :), height(:, :), slope_x(:, :), slope_y(:, :)
    contains
       procedure :: prepare
       procedure :: start
+      procedure :: set_origin
       procedure :: evaluate
       procedure :: slopes_at
       procedure :: slip_of
@@ -125,7 +134,26 @@ contains
       end do
       ! The slip is that of the road over the rubber.
       self%near%slip = -self%near%place
+      self%whole = self%near
+      self%part = 1.0_dp
    end subroutine find_responses
+
+   !> Set the origin of a path. `done` is .false. if there is not enough memory.
+   subroutine set_origin(self, origin, done)
+      class(joint_equations_type), intent(inout) :: self
+      real(dp), intent(in) :: origin(:, :, :)          !! m [nx, 2 or 3, rows]; of these the first two
+      logical, intent(out) :: done
+      integer :: status(2)
+
+      status = 0
+      if (.not. allocated(self%place)) then
+         allocate (self%place(self%grid%nx, 2, self%grid%rows()), source=0.0_dp, stat=status(1))
+         allocate (self%origin, source=self%place, stat=status(2))
+      end if
+      done = .not. any_process(any(status /= 0))
+      if (.not. done) return
+      self%origin(:, :, :) = origin(:, :2, :)
+   end subroutine set_origin
 
    !> Read the slopes of the road near the displaced cells.
    subroutine slopes_at(self, shift, height, slope_x, slope_y)
@@ -135,9 +163,34 @@ contains
       real(dp) :: place(2)
 
       place = self%plan%road - shift
-      call displaced(self%contact%road, place(1), place(2), self%contact%tangential%trial(:, 1, :), &
-         self%contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
+      call read_road(self, place, height, slope_x, slope_y)
    end subroutine slopes_at
+
+   !> Read the road, displaced by `base`, where the rubber's surface of the last state touches it.
+   subroutine read_road(self, base, height, slope_x, slope_y)
+      class(joint_equations_type), intent(inout) :: self
+      real(dp), intent(in) :: base(2)                  !! m
+      real(dp), intent(out) :: height(:, :), slope_x(:, :), slope_y(:, :)
+
+      associate (trial => self%contact%tangential%trial)
+         if (self%part < 1.0_dp .or. self%part > 1.0_dp) then
+            self%place(:, :, :) = self%origin + self%part*(trial - self%origin)
+            call displaced(self%contact%road, base(1), base(2), self%place(:, 1, :), self%place(:, 2, :), &
+               height, slope_x, slope_y)
+         else
+            call displaced(self%contact%road, base(1), base(2), trial(:, 1, :), trial(:, 2, :), height, slope_x, slope_y)
+         end if
+      end associate
+   end subroutine read_road
+
+   !> Set the part of the way from the origin at which the road is read.
+   subroutine set_part(self, part)
+      class(joint_equations_type), intent(inout) :: self
+      real(dp), intent(in) :: part
+
+      self%part = part
+      self%near%place = part*self%whole%place
+   end subroutine set_part
 
    !> The slip of a cell.
    pure function slip_of(self, i, j) result(slip)
@@ -158,8 +211,8 @@ contains
       associate (contact => self%contact, plan => self%plan)
          call form_pressure(self, contact, state%s)
          call contact%tangential%try(contact%state%tangential, state%t)
-         call displaced(contact%road, plan%road(1), plan%road(2), contact%tangential%trial(:, 1, :), &
-            contact%tangential%trial(:, 2, :), self%height, self%slope_x, self%slope_y)
+         call set_part(self, state%part)
+         call read_road(self, plan%road, self%height, self%slope_x, self%slope_y)
          !$omp parallel do default(none) shared(self, state) private(j) num_threads(self%operator%threads)
          do j = 1, self%grid%rows()
             call evaluate_row(self, self%contact, state, j)
@@ -259,6 +312,8 @@ contains
       if (allocated(self%height)) deallocate (self%height)
       if (allocated(self%slope_x)) deallocate (self%slope_x)
       if (allocated(self%slope_y)) deallocate (self%slope_y)
+      if (allocated(self%origin)) deallocate (self%origin)
+      if (allocated(self%place)) deallocate (self%place)
       self%ready = .false.
    end subroutine destroy
 

@@ -2,15 +2,20 @@
 !>
 !> A pass computes pressure, traction and place one after the other. If the traction of a cell jumps when the
 !> cell opens, the passes oscillate between two states. The equations of module `joint_equations` contain all
-!> unknowns and are continuous; module `joint_newton` solves them.
+!> unknowns and are continuous; module `joint_newton` solves them. If it does not succeed from the result of the last
+!> pass, a path of solutions is followed (module `joint_path`): from this result, with the road at the place of the pass,
+!> to the solution, with the road at the displacement that the traction causes.
 !>
-!> Memory from the first use on: 30 fields of doubles, and the directions of GMRES. If there is not enough memory,
-!> the step is not solved.
+!> Memory from the first use on: 30 fields of doubles, and the directions of GMRES; on a path 25 fields more. If there is
+!> not enough memory, the step is not solved.
 module joint_step
    use asperity_schedule, only : planned_row_type
    use contact_model, only : contact_type
    use joint_equations, only : joint_equations_type
    use joint_newton, only : joint_newton_type
+   use joint_path, only : follow_path
+   use asperity_precision, only : dp
+   use stop_watch, only : stop_is_due
    implicit none
    private
 
@@ -29,10 +34,11 @@ contains
 
    !> Solve a step, starting from the state after the last pass. If the step is solved, the state of the contact,
    !> the trial displacement and the shares of the cells are those of the solution.
-   subroutine solve(self, contact, plan, solved, transforms)
+   subroutine solve(self, contact, plan, place, solved, transforms)
       class(joint_step_type), intent(inout) :: self
       class(contact_type), intent(inout), target :: contact
       type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: place(:, :, :)           !! of the last pass, m [nx, 2 or 3, rows]
       logical, intent(out) :: solved
       integer, intent(out) :: transforms               !! number of transforms
 
@@ -47,9 +53,28 @@ contains
       end if
       call self%equations%start(contact, plan, self%newton%now)
       call self%newton%solve(self%equations, contact%case%solver%tolerance, solved)
-      if (solved) call self%equations%return_solution(contact, self%newton%now, solved)
       transforms = 6*self%equations%evaluations
+      if (.not. (solved .or. stop_is_due())) then
+         call follow(self, contact, plan, place, solved)
+         transforms = transforms + 6*self%equations%evaluations
+      end if
+      if (solved) call self%equations%return_solution(contact, self%newton%now, solved)
    end subroutine solve
+
+   !> Solve a step by a path of solutions from the result of the last pass.
+   subroutine follow(self, contact, plan, place, solved)
+      class(joint_step_type), intent(inout) :: self
+      class(contact_type), intent(inout), target :: contact
+      type(planned_row_type), intent(in) :: plan
+      real(dp), intent(in) :: place(:, :, :)
+      logical, intent(out) :: solved
+
+      call self%equations%start(contact, plan, self%newton%now)
+      call self%equations%set_origin(place, solved)
+      if (.not. solved) return
+      call follow_path(self%newton, self%equations, contact%case%solver%tolerance, solved)
+      self%newton%steps_to_halve = 0
+   end subroutine follow
 
    !> Free the operator and the fields.
    subroutine destroy(self)
