@@ -36,6 +36,15 @@ def test_constant_shear_settles_within_a_bound_of_work(program, seed):
     assert done["ffts"] < 1e5
 
 
+# Newton's method for the whole step fails from the last pass; a path of solutions leads on.
+@pytest.mark.parametrize("seed", [7700297, 7700366, 7700382])
+def test_path_of_solutions_settles(program, seed):
+    """Steps on steep roads with oblong cells settle."""
+    done = try_case((seed, program), slopes=(0.5, 1.5), ratios=(0.2, 5.0))
+    assert done["end"] == "settled", done["message"]
+    assert done["rows"] == 16
+
+
 OBLIQUE = "velocity_x = 0.1, velocity_y = 0.05"
 PULL = "traction_x = 6.696e4, ramp = 'linear'"
 

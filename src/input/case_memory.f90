@@ -25,7 +25,8 @@ module case_memory
    !> The same of a steady row without friction.
    real(dp), parameter :: newton_fields = 11.0_dp, newton_directions = 50.0_dp
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
-   !> Further fields of a steady row: three states on a path of solutions, and the plane across it (module `joint_plane`).
+   !> Further fields on a path of solutions: three states, the plane across it (module `joint_plane`), and the places where
+   !> the road is read.
    real(dp), parameter :: path_fields = 28.0_dp
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
@@ -87,8 +88,7 @@ contains
       steady = any(case%phases%steady)
       rubs = road_moves(case%phases) .and. case%friction%law /= 'none'
       fields = 0.0_dp
-      if (rubs .and. (in_time .or. steady)) fields = joint_fields + joint_directions + joint_inverse
-      if (rubs .and. steady) fields = fields + path_fields
+      if (rubs .and. (in_time .or. steady)) fields = joint_fields + joint_directions + joint_inverse + path_fields
       if (steady .and. .not. rubs) fields = newton_fields + tile_fields + newton_directions
       bytes = 8.0_dp*fields*real(case%grid%nx, dp)*real(case%grid%ny, dp)
    end function joint_memory
