@@ -22,6 +22,7 @@ program main
    use test_fft_conv, only : run_fft_conv
    use test_field_sums, only : run_field_sums
    use test_friction_cg, only : run_friction_cg
+   use test_friction_form, only : run_friction_form
    use test_friction_law, only : run_friction_law
    use test_hdf5_file, only : run_hdf5_file
    use test_input_listing, only : run_input_listing
@@ -96,6 +97,7 @@ program main
          suite_type('starting_steps', run_starting_steps), &
          suite_type('block_motion', run_block_motion), &
          suite_type('outside_balance', run_outside_balance), &
+         suite_type('friction_form', run_friction_form), &
          suite_type('friction_law', run_friction_law), &
          suite_type('friction_cg', run_friction_cg), &
          suite_type('xdmf', run_xdmf), &

@@ -101,8 +101,8 @@ def check(data: dict[str, Any], quick: bool) -> None:
             # The area is a count of cells; with 24 cells per side the contact is 16 cells wide.
             assert np.abs(stick - known).max() < (0.06 if quick else 0.03), \
                 f"{method}: {ratio}: {np.abs(stick - known).max():.3f} of the area off"
-    # An iteration takes one and a half products of the operator and one of the preconditioner, with
-    # four transforms each. The aim was 30 products at half of full slip.
+    # An iteration takes a product of the operator and one of the preconditioner, with four
+    # transforms each. The aim was 30 products at half of full slip.
     half = data["fast_iterations"][list(data["ratios"]).index(0.5)]
     assert half.max() <= 20, f"fast: {half.max()} iterations at half of full slip"
     assert data["fast_iterations"].max() <= 22, f"fast: {data['fast_iterations'].max()} iterations"

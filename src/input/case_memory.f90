@@ -147,7 +147,7 @@ contains
 
       arms = size(case%material%prony_g)
       in_time = any(.not. case%phases%static .and. case%phases%steps > 0)
-      fields = 51.4_dp
+      fields = 52.3_dp
       ! Fields that the passes of steps in time keep.
       if (in_time) fields = fields + 11.0_dp
       if (arms > 0) fields = fields + 4.0_dp + 2.0_dp*arms

@@ -10,29 +10,45 @@ module coarse_fields
    implicit none
    private
 
-   public :: coarse_grid, coarsen, refine_pressure
+   public :: coarse_grid, coarsen, mean_of_strips, new_row_means, refine_pressure, row_means_type
 
    real(dp), parameter :: least_part = 1e-3_dp   !! of the nearest pressure that an interpolated one keeps at least
    real(dp), parameter :: ratio = 4.0_dp   !! cells of the grid to a cell of the coarse one along a side, about
 
+   !> How the means over the coarse cells of a row are formed.
+   type :: row_means_type
+      integer, allocatable :: first(:), last(:)    !! cells that a coarse cell covers, also in part [coarse cells]
+      real(dp), allocatable :: from(:), to(:)      !! the parts of the coarse cell that lie in these two
+      real(dp) :: part = 1.0_dp                    !! the part that lies in any cell between them
+   contains
+      procedure :: take
+   end type row_means_type
+
 contains
 
    !> A grid over the same lengths with about a quarter of the cells along each side, as many as are cheap to
-   !> transform.
-   function coarse_grid(fine) result(coarse)
+   !> transform. If `squarer` is true, oblong cells are joined less along their longer side.
+   function coarse_grid(fine, squarer) result(coarse)
       type(grid_type), intent(in) :: fine
+      logical, intent(in), optional :: squarer
       type(grid_type) :: coarse
+      real(dp) :: joined(2)                        !! cells of the grid to a coarse one along x and y, about
 
-      coarse = new_grid(fewer(fine%nx), fewer(fine%ny), fine%lx, fine%ly, fine%boundary)
+      joined = ratio
+      if (present(squarer)) then
+         if (squarer) joined = max(1.0_dp, ratio*min(fine%dx, fine%dy)/[fine%dx, fine%dy])
+      end if
+      coarse = new_grid(fewer(fine%nx, joined(1)), fewer(fine%ny, joined(2)), fine%lx, fine%ly, fine%boundary)
       if (fine%shared) call coarse%share_rows()
 
    contains
 
       !> The number of coarse cells along a side.
-      pure integer function fewer(cells)
+      pure integer function fewer(cells, joined)
          integer, intent(in) :: cells
+         real(dp), intent(in) :: joined
 
-         fewer = min(good_length(max(1, nint(cells/ratio)), 1), cells)
+         fewer = min(good_length(max(1, nint(cells/joined)), 1), cells)
       end function fewer
 
    end function coarse_grid
@@ -43,14 +59,27 @@ contains
       real(dp), intent(in) :: field(:, :)          !! [fine%nx, fine%rows()]
       integer, intent(in) :: threads
       real(dp), intent(out) :: means(:, :)         !! [coarse%nx, coarse%rows()]
-      real(dp), allocatable :: strips(:, :), fetched(:, :)
-      integer :: covered(2), j
+      type(row_means_type) :: row
+      real(dp), allocatable :: strips(:, :)
+      integer :: j
 
       allocate (strips(coarse%nx, fine%rows()))
-      !$omp parallel do default(none) shared(field, strips) private(j) num_threads(threads)
+      row = new_row_means(fine%nx, coarse%nx)
+      !$omp parallel do default(none) shared(field, strips, row) private(j) num_threads(threads)
       do j = 1, size(strips, 2)
-         call mean_along_row(field(:, j), strips(:, j))
+         call row%take(field(:, j), strips(:, j))
       end do
+      call mean_of_strips(fine, coarse, strips, threads, means)
+   end subroutine coarsen
+
+   !> Means over the rows of the coarse cells, from the means along each row of the grid. Collective.
+   subroutine mean_of_strips(fine, coarse, strips, threads, means)
+      type(grid_type), intent(in) :: fine, coarse
+      real(dp), intent(in) :: strips(:, :)         !! [coarse%nx, fine%rows()]
+      integer, intent(in) :: threads
+      real(dp), intent(out) :: means(:, :)         !! [coarse%nx, coarse%rows()]
+      real(dp), allocatable :: fetched(:, :)
+      integer :: covered(2)
 
       if (.not. fine%shared) then
          call mean_over_rows(strips, 1)
@@ -82,23 +111,38 @@ contains
          end do
       end subroutine mean_over_rows
 
-   end subroutine coarsen
+   end subroutine mean_of_strips
 
-   !> Means of the values of a row over its coarse cells.
-   pure subroutine mean_along_row(values, means)
-      real(dp), intent(in) :: values(:)
-      real(dp), intent(out) :: means(:)
-      integer :: i, k, m, n
+   !> Prepare the means along rows of n cells over a smaller number of coarse cells.
+   pure function new_row_means(n, coarse) result(self)
+      integer, intent(in) :: n, coarse
+      type(row_means_type) :: self
+      integer :: i
 
-      n = size(values)
-      m = size(means)
-      do i = 1, m
-         means(i) = 0.0_dp
-         do k = first_cell(n, m, i), last_cell(n, m, i)
-            means(i) = means(i) + part_of(n, m, k, i)*values(k)
+      self%first = first_cell(n, coarse, [(i, i=1, coarse)])
+      self%last = last_cell(n, coarse, [(i, i=1, coarse)])
+      self%from = part_of(n, coarse, self%first, [(i, i=1, coarse)])
+      self%to = part_of(n, coarse, self%last, [(i, i=1, coarse)])
+      where (self%last == self%first) self%to = 0.0_dp
+      self%part = real(coarse, dp)/n
+   end function new_row_means
+
+   !> Take the means of the values of a row over its coarse cells.
+   pure subroutine take(self, values, means)
+      class(row_means_type), intent(in) :: self
+      real(dp), intent(in), contiguous :: values(:)
+      real(dp), intent(out), contiguous :: means(:)
+      real(dp) :: between
+      integer :: i, k
+
+      do i = 1, size(means)
+         between = 0.0_dp
+         do k = self%first(i) + 1, self%last(i) - 1
+            between = between + values(k)
          end do
+         means(i) = self%from(i)*values(self%first(i)) + self%part*between + self%to(i)*values(self%last(i))
       end do
-   end subroutine mean_along_row
+   end subroutine take
 
    !> The first of n cells that a coarse cell covers, also in part.
    elemental integer function first_cell(n, coarse, cell)

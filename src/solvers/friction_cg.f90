@@ -27,15 +27,14 @@
 !> of a spring that pulls the road, and `least_scale`.
 !>
 !> Memory in addition to the caller's fields, in fields of doubles: two for the spectrum of the operator (four on a free
-!> grid), two for that of the preconditioner, and 3/4 for the symbols of the latter; and 18 fields that contain only the
-!> cells in contact, with rows as long as the longest one (module `contact_runs`). The fallback takes four more of these
-!> from its first use on.
+!> grid), two for that of the preconditioner, 3/4 for the symbols of the latter, and about one for the prediction of the
+!> length of a step (module `friction_form`); and 18 fields that contain only the cells in contact, with rows as long as
+!> the longest one (module `contact_runs`). The fallback takes four more of these from its first use on.
 !>
 !> examples/friction_iterations and docs/benchmarks.md show how the number of iterations depends on the mesh. An
-!> iteration of 'fast' takes one and a half products of the operator if points slip, one if all stick, and one product
-!> of its preconditioner on the grid without padding. With the slope effect there is no proof of convergence. On
-!> slopes steeper than 1/mu the traction has no bound uphill. If many points are on such slopes, a solution may not be
-!> found, or may not exist.
+!> iteration of 'fast' takes one product of the operator, and one product of its preconditioner on the grid without
+!> padding. With the slope effect there is no proof of convergence. On slopes steeper than 1/mu the traction has no bound
+!> uphill. If many points are on such slopes, a solution may not be found, or may not exist.
 module friction_cg
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
@@ -117,7 +116,7 @@ contains
          allocate (friction_gradient_type :: self%method)
       case ('fast')
          allocate (fast)
-         call new_friction_fast(fast, grid, operator%kernel, error)
+         call new_friction_fast(fast, grid, operator%kernel, self%compliance, error)
          call move_alloc(fast, self%method)
       case default
          call fail(error, error_input, "method = '"//chosen//"': must be 'fast', 'thesis' or 'gradient'")

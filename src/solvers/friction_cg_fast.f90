@@ -31,8 +31,8 @@
 !> start), a shorter move along the same path is taken, to the point where a secant predicts that g'.(T' - T)
 !> vanishes. This does not need an energy, which does not exist with the slope effect.
 !>
-!> An iteration costs one operator product if all points stick; otherwise two, of which the first needs no inverse
-!> transform. It also costs one preconditioner; each shortened step costs one product more. beta is formed with z_old
+!> An iteration costs one operator product, because d.A d is predicted if points slip (module `friction_form`). It also
+!> costs one preconditioner; each shortened step costs one product more. beta is formed with z_old
 !> instead of the old g, which is not kept: the preconditioner is symmetric, so that both agree as long as no point
 !> changes its state.
 !>
@@ -41,15 +41,17 @@
 module friction_cg_fast
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
-   use fft_conv, only : columns_apply, columns_form, convolution_type
+   use fft_conv, only : columns_apply, convolution_type
    use friction_cg_gradient, only : friction_gradient_type
    use friction_fields, only : fit_field
    use friction_directions, only : direction_row, direction_sums_type, total_of
+   use friction_form, only : friction_form_type, new_friction_form
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total
    use friction_preconditioner, only : friction_preconditioner_type, new_friction_preconditioner
    use friction_problem, only : friction_problem_type
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use, intrinsic :: iso_fortran_env, only : int64
    use kernels, only : kernel_type
    use regular_grid, only : grid_type
    use stop_watch, only : stop_is_due
@@ -70,6 +72,7 @@ module friction_cg_fast
    type, extends(friction_method_type) :: friction_fast_type
       type(friction_gradient_type), private :: fallback
       type(friction_preconditioner_type), private :: preconditioner
+      type(friction_form_type), private :: form
       real(dp), allocatable, private :: d(:, :, :)             !! [width, 2, rows]
    contains
       procedure :: iterate
@@ -82,7 +85,8 @@ module friction_cg_fast
       real(dp) :: old_gz = 0.0_dp                !! g.z in the iteration before
       real(dp) :: slope = 0.0_dp                 !! g.d
       real(dp) :: curvature = 0.0_dp             !! sum of lam |d|^2, the part of the bounds
-      real(dp) :: form = 0.0_dp                  !! d.A d
+      real(dp) :: square = 0.0_dp                !! |d|^2
+      real(dp) :: form = 0.0_dp                  !! d.A d, predicted if points slip
       real(dp) :: milestone = 0.0_dp             !! residual some iterations ago
       integer :: since = 0                       !! the iteration of the milestone
       real(dp) :: excess = overshoot             !! overshoot that is allowed
@@ -91,13 +95,15 @@ module friction_cg_fast
 contains
 
    !> Make the method for the kernel of a solid.
-   subroutine new_friction_fast(self, grid, kernel, error)
+   subroutine new_friction_fast(self, grid, kernel, compliance, error)
       type(friction_fast_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel        !! tangential response of the solid
+      real(dp), intent(in) :: compliance             !! of a cell under its own unit traction, m/Pa
       type(error_type), allocatable, intent(out) :: error
 
       call new_friction_preconditioner(self%preconditioner, grid, kernel, error)
+      if (.not. allocated(error)) call new_friction_form(self%form, grid, kernel, compliance, error)
    end subroutine new_friction_fast
 
    !> Iterate (see `friction_method_type`). If the conjugate gradients stall, the fallback alternates with them.
@@ -112,6 +118,7 @@ contains
       self%stopped = .false.
       call fit_field(self%d, problem%width, 2, problem%rows)
       call self%preconditioner%set_mean_stiffness(operator)
+      call self%form%set_mean_compliance(operator)
       do while (iterations < goal%most_iterations)
          call iterate_gradients(self, problem, operator, goal, iterations)
          if (self%stopped) exit
@@ -124,7 +131,7 @@ contains
          if (self%stopped) exit
          if (problem%solved(goal%tolerance)) exit
       end do
-      self%ffts = self%preconditioner%inverse%ffts
+      self%ffts = self%preconditioner%inverse%ffts + nint(self%form%transforms(), int64)
    end subroutine iterate
 
    !> Iterate by conjugate gradients until the problem is solved, the residual stalls, there is no direction of descent,
@@ -158,9 +165,9 @@ contains
       end do
    end subroutine iterate_gradients
 
-   !> Compute the direction d = z + beta Z d, or d = z if the former does not descend, and its product with A. If no
-   !> point slips, the whole product A d is needed, because the slip then follows by recurrence. Otherwise d.A d is
-   !> sufficient, which saves the inverse transform.
+   !> Compute the direction d = z + beta Z d, or d = z if the former does not descend, and d.A d. If no point slips, this
+   !> follows from the product A d, with which the slip then changes by recurrence. Otherwise a prediction is sufficient,
+   !> because the slip is computed from a product with T'.
    subroutine find_direction(self, problem, operator, now)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -178,7 +185,11 @@ contains
          self%preconditioner%shift = 0.0_dp                                ! z contains the shift already
          call form_direction(self, problem, operator, 0.0_dp, now)
       end if
-      call operator%columns(merge(columns_form, columns_apply, problem%slipping > 0), now%form)
+      if (problem%slipping > 0) then
+         call self%form%predict(now%square, now%form)
+      else
+         call operator%columns(columns_apply, now%form)
+      end if
       call problem%spring%add_form(self%d, now%form)
    end subroutine find_direction
 
@@ -234,7 +245,8 @@ contains
       end if
    end subroutine move_to
 
-   !> Compute d = z + beta Z d and its transform, the slope g.d, and the curvature of the bounds along d.
+   !> Compute d = z + beta Z d, the slope g.d, |d|^2, and the curvature of the bounds along d. d is taken for the
+   !> prediction of d.A d, or transformed if no point slips.
    subroutine form_direction(self, problem, operator, beta, now)
       type(friction_fast_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -243,18 +255,27 @@ contains
       type(iteration_type), intent(inout) :: now
       type(direction_sums_type), allocatable :: rows(:)
       type(direction_sums_type) :: sums
-      integer :: j
+      real(dp) :: whole(problem%nx)
+      integer :: c, j
 
       allocate (rows(problem%rows))
-      !$omp parallel do default(none) shared(self, problem, operator, beta, rows) &
-      !$omp private(j) num_threads(problem%threads)
+      !$omp parallel do default(none) shared(self, problem, operator, beta, rows) private(c, j, whole) &
+      !$omp num_threads(problem%threads)
       do j = 1, problem%rows
          call direction_row(problem%compliance, beta, self%preconditioner%shift, problem%work%slip(:, :, j), &
             problem%work%tangent(:, :, j), self%preconditioner%z(:, :, j), self%d(:, :, j), rows(j))
-         call problem%spread_to_transform(operator, self%d(:, :, j), j)
+         if (problem%slipping == 0) then
+            call problem%spread_to_transform(operator, self%d(:, :, j), j)
+         else
+            do c = 1, 2
+               call problem%work%runs%spread(j, self%d(:, c, j), whole)
+               call self%form%take_row(c, j, whole)
+            end do
+         end if
       end do
       sums = total_of(rows)
       now%slope = sums%slope
+      now%square = sums%square
       now%curvature = sums%curvature
    end subroutine form_direction
 
@@ -263,6 +284,7 @@ contains
       class(friction_fast_type), intent(inout) :: self
 
       call self%preconditioner%destroy()
+      call self%form%destroy()
    end subroutine destroy
 
 end module friction_cg_fast

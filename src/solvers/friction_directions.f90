@@ -29,6 +29,7 @@ module friction_directions
    type :: direction_sums_type
       real(dp) :: slope = 0.0_dp             !! g.d
       real(dp) :: curvature = 0.0_dp         !! of the bounds along d
+      real(dp) :: square = 0.0_dp            !! |d|^2
    end type direction_sums_type
 
    !> Sums over all rows, in order.
@@ -115,7 +116,7 @@ contains
       sums%bent = [bx, by]
    end subroutine unscaled_row
 
-   !> Compute d = z + w Z c + beta Z d and z' = z + w Z c in a row, g.d, and the curvature of the bounds along d.
+   !> Compute d = z + w Z c + beta Z d and z' = z + w Z c in a row, g.d, |d|^2, and the curvature of the bounds along d.
    pure subroutine direction_row(compliance, beta, c, r, tangent, z, d, sums)
       real(dp), intent(in) :: compliance
       real(dp), intent(in) :: beta
@@ -125,7 +126,7 @@ contains
       real(dp), intent(inout), contiguous :: z(:, :)       !! [nx, 2]
       real(dp), intent(inout), contiguous :: d(:, :)       !! [nx, 2] Pa
       type(direction_sums_type), intent(out) :: sums
-      real(dp) :: slope, curvature
+      real(dp) :: slope, curvature, square
       real(dp) :: av, ax, ay, cx, cy, weight
       integer :: i
 
@@ -133,7 +134,8 @@ contains
       cy = c(2)
       slope = 0.0_dp
       curvature = 0.0_dp
-      !$omp simd private(av, ax, ay, weight) reduction(+: slope, curvature)
+      square = 0.0_dp
+      !$omp simd private(av, ax, ay, weight) reduction(+: slope, curvature, square)
       do i = 1, size(r, 1)
          av = cx*tangent(i, 1) + cy*tangent(i, 2)
          z(i, 1) = z(i, 1) + tangent(i, 3)*(cx - av*tangent(i, 1))
@@ -145,10 +147,11 @@ contains
          slope = slope + (r(i, 1) - av*tangent(i, 1))*ax + (r(i, 2) - av*tangent(i, 2))*ay
          weight = merge(tangent(i, 3), 1.0_dp, tangent(i, 3) > 0.0_dp)
          curvature = curvature + compliance*(1.0_dp/weight - 1.0_dp)*(ax**2 + ay**2)
+         square = square + (ax**2 + ay**2)
          d(i, 1) = ax
          d(i, 2) = ay
       end do
-      sums = direction_sums_type(slope, curvature)
+      sums = direction_sums_type(slope, curvature, square)
    end subroutine direction_row
 
    !> Sums of a preconditioned field.
@@ -172,15 +175,15 @@ contains
       type(direction_sums_type), intent(in) :: rows(:)
       type(direction_sums_type) :: total
       real(dp), allocatable :: packed(:, :)
-      real(dp) :: sums(2)
+      real(dp) :: sums(3)
       integer :: j
 
-      allocate (packed(2, size(rows)))
+      allocate (packed(3, size(rows)))
       do j = 1, size(rows)
-         packed(:, j) = [rows(j)%slope, rows(j)%curvature]
+         packed(:, j) = [rows(j)%slope, rows(j)%curvature, rows(j)%square]
       end do
       sums = row_totals(packed)
-      total = direction_sums_type(sums(1), sums(2))
+      total = direction_sums_type(sums(1), sums(2), sums(3))
    end function total_of_directions
 
 end module friction_directions
