@@ -13,7 +13,7 @@ module coarse_fields
    public :: coarse_grid, coarsen, mean_of_strips, new_row_means, refine_pressure, row_means_type
 
    real(dp), parameter :: least_part = 1e-3_dp   !! of the nearest pressure that an interpolated one keeps at least
-   real(dp), parameter :: ratio = 4.0_dp   !! cells of the grid to a cell of the coarse one along a side, about
+   integer, parameter :: ratio = 4         !! cells of the grid to a cell of the coarse one along a side, about
 
    !> How the means over the coarse cells of a row are formed.
    type :: row_means_type
@@ -32,11 +32,11 @@ contains
       type(grid_type), intent(in) :: fine
       logical, intent(in), optional :: squarer
       type(grid_type) :: coarse
-      real(dp) :: joined(2)                        !! cells of the grid to a coarse one along x and y, about
+      integer :: joined(2)                         !! cells of the grid to a coarse one along x and y, about
 
       joined = ratio
       if (present(squarer)) then
-         if (squarer) joined = max(1.0_dp, ratio*min(fine%dx, fine%dy)/[fine%dx, fine%dy])
+         if (squarer) joined = max(1, nint(ratio*min(fine%dx, fine%dy)/[fine%dx, fine%dy]))
       end if
       coarse = new_grid(fewer(fine%nx, joined(1)), fewer(fine%ny, joined(2)), fine%lx, fine%ly, fine%boundary)
       if (fine%shared) call coarse%share_rows()
@@ -46,9 +46,9 @@ contains
       !> The number of coarse cells along a side.
       pure integer function fewer(cells, joined)
          integer, intent(in) :: cells
-         real(dp), intent(in) :: joined
+         integer, intent(in) :: joined
 
-         fewer = min(good_length(max(1, nint(cells/joined)), 1), cells)
+         fewer = min(good_length(max(1, nint(real(cells, dp)/joined)), 1), cells)
       end function fewer
 
    end function coarse_grid
