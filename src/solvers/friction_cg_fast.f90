@@ -31,10 +31,9 @@
 !> start), a shorter move along the same path is taken, to the point where a secant predicts that g'.(T' - T)
 !> vanishes. This does not need an energy, which does not exist with the slope effect.
 !>
-!> An iteration costs one operator product, because d.A d is predicted if points slip (module `friction_form`). It also
-!> costs one preconditioner; each shortened step costs one product more. beta is formed with z_old
-!> instead of the old g, which is not kept: the preconditioner is symmetric, so that both agree as long as no point
-!> changes its state.
+!> An iteration costs one product of the operator and one of the preconditioner, because d.A d is only predicted if points
+!> slip (module `friction_form`). Each shortened step costs one product more. beta is formed with z_old instead of the old
+!> g, which is not kept: the preconditioner is symmetric, so that both agree as long as no point changes its state.
 !>
 !> There is no proof that this converges. If it stalls, or finds no direction of descent, some steps of spectral
 !> projected gradients (module `friction_cg_gradient`) follow, and then the method continues.
