@@ -113,8 +113,11 @@ contains
       type(friction_goal_type), intent(in) :: goal
       integer, intent(inout) :: iterations
       type(friction_goal_type) :: some_steps
+      integer(int64) :: before, coarse_before          ! numbers of transforms
 
       self%stopped = .false.
+      before = self%preconditioner%inverse%ffts
+      coarse_before = self%form%coarse%ffts
       call fit_field(self%d, problem%width, 2, problem%rows)
       call self%preconditioner%set_mean_stiffness(operator)
       call self%form%set_mean_compliance(operator)
@@ -130,7 +133,8 @@ contains
          if (self%stopped) exit
          if (problem%solved(goal%tolerance)) exit
       end do
-      self%ffts = self%preconditioner%inverse%ffts + nint(self%form%transforms(), int64)
+      ! The rounding of this sum must not depend on earlier solves: a run that is continued has the same counts.
+      self%ffts = self%ffts + self%preconditioner%inverse%ffts - before + self%form%transforms(since=coarse_before)
    end subroutine iterate
 
    !> Iterate by conjugate gradients until the problem is solved, the residual stalls, there is no direction of descent,

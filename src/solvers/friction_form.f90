@@ -19,6 +19,7 @@ module friction_form
    use fft_conv, only : columns_form, convolution_type, new_convolution
    use field_sums, only : row_total
    use kernels, only : kernel_type
+   use, intrinsic :: iso_fortran_env, only : int64
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
@@ -106,12 +107,13 @@ contains
       form = self%cells*form + self%rest*max(0.0_dp, square - self%cells*row_total(rows))
    end subroutine predict
 
-   !> Number of transforms so far, in transforms of the whole grid.
-   pure function transforms(self) result(count)
+   !> Number of transforms since a count of the coarse ones, in transforms of the whole grid.
+   pure function transforms(self, since) result(count)
       class(friction_form_type), intent(in) :: self
-      real(dp) :: count
+      integer(int64), intent(in) :: since            !! `coarse%ffts` before
+      integer(int64) :: count
 
-      count = real(self%coarse%ffts, dp)/self%cells
+      count = nint(real(self%coarse%ffts - since, dp)/self%cells, int64)
    end function transforms
 
    !> Free the plans.
