@@ -11,6 +11,8 @@
 !> In the solves of the examples its error is mostly within a few per cent. A step that is so much too long or too short
 !> costs hardly any iterations, because the slip of the new traction is computed from a product in any case.
 !>
+!> On grids of few cells the coarse grid is the grid itself, and the value is exact.
+!>
 !> Memory: half a field for the means along rows, and what an operator on the coarse grid takes.
 module friction_form
    use asperity_errors, only : error_type
@@ -25,6 +27,8 @@ module friction_form
    private
 
    public :: friction_form_type, new_friction_form
+
+   real(dp), parameter :: few_cells = 1024.0_dp    !! up to which the exact value costs little, and is used
 
    !> The prediction and its work space. A variable of this type must not be copied.
    type :: friction_form_type
@@ -55,7 +59,8 @@ contains
       type(grid_type) :: coarse
 
       self%grid = grid
-      coarse = coarse_grid(grid, squarer=.true.)
+      coarse = grid
+      if (grid%cells() > few_cells) coarse = coarse_grid(grid, squarer=.true.)
       call new_convolution(self%coarse, coarse, kernel, error)
       if (allocated(error)) return
       self%along_row = new_row_means(grid%nx, coarse%nx)
