@@ -1,9 +1,9 @@
 !> The way in which idle threads wait. By default they spin for a long time. On a machine with other users this can make
 !> a run ten times slower; OMP_WAIT_POLICY = passive lets them sleep instead. To wake a thread takes tens of
 !> microseconds, which is as long as a pass over a small field. GNU's OpenMP therefore lets threads spin for about that
-!> time before they sleep (GOMP_SPINCOUNT). That costs little if others use the machine, and saves a tenth of the time
-!> of the default case if they do not. OpenMP reads these variables only when a program starts. Unless the user has set
-!> OMP_WAIT_POLICY, the program therefore sets both and starts itself again.
+!> time before they sleep (GOMP_SPINCOUNT), which saves time on an idle machine and costs little on a busy one. OpenMP
+!> reads these variables only when a program starts. Unless the user has set OMP_WAIT_POLICY, the program therefore sets
+!> both and starts itself again.
 module wait_policy
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_null_char
    use program_arguments, only : argument_text, argument_type, replace_program

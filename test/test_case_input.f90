@@ -213,7 +213,7 @@ contains
 
    !> The resolved settings are an input of the same case.
    subroutine resolved_settings_give_the_same_case()
-      type(case_type) :: again, case
+      type(case_type) :: again, case, in_time
       type(error_type), allocatable :: error
       character(:), allocatable :: text
 
@@ -245,8 +245,12 @@ contains
       call check_close(joint_memory(case), 111.0_dp*8*64*32, 1.0e-9_dp, 'memory: a steady row solved all at once')
       case%friction%law = 'coulomb'
       call check_close(joint_memory(case), 443.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
-      case%friction%law = 'none'
       case%phases(3)%steady = .false.
+      in_time = case
+      in_time%phases(3)%static = .false.
+      in_time%phases(3)%steps = 1
+      call check_close(joint_memory(in_time), 443.0_dp*8*64*32, 1.0e-9_dp, 'memory: a time step solved all at once')
+      case%friction%law = 'none'
       case%phases(3)%velocity_y = 0.0_dp
       case%material%prony_g = [1.0_dp, 2.0_dp]
       call check_close(fields_of(case), 13.15_dp, 1.0e-9_dp, 'memory: arms')

@@ -1,9 +1,9 @@
 """Try the passes of steps with friction on random hard cases, and list those that did not settle.
 
 Roads are self-affine or made of a few waves, with rms slopes up to 0.6; blocks are half-spaces,
-thin or thick, elastic or with up to five arms, with or without mass and adhesion; cells are
-periodic or free, square or oblong; the road moves along an axis or obliquely. The grids are small,
-so that 500 cases take some minutes. A case ends in one of three ways:
+thin or thick, elastic or with up to five arms, with or without mass and adhesion; maps are periodic
+or free, square or oblong, with square cells; the road moves along an axis or obliquely. The grids
+are small, so that 500 cases take some minutes. A case ends in one of three ways:
 
 settled    exit status 0, and `residual_coupling` of all rows is within the tolerance
 reported   exit status 4: the run says that a solver or the passes did not converge

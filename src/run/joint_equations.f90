@@ -173,7 +173,7 @@ contains
       real(dp), intent(out) :: height(:, :), slope_x(:, :), slope_y(:, :)
 
       associate (trial => self%contact%tangential%trial)
-         if (self%part < 1.0_dp .or. self%part > 1.0_dp) then
+         if (abs(self%part - 1.0_dp) > 0.0_dp) then
             self%place(:, :, :) = self%origin + self%part*(trial - self%origin)
             call displaced(self%contact%road, base(1), base(2), self%place(:, 1, :), self%place(:, 2, :), &
                height, slope_x, slope_y)

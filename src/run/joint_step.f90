@@ -73,7 +73,7 @@ contains
       call self%equations%set_origin(place, solved)
       if (.not. solved) return
       call follow_path(self%newton, self%equations, contact%case%solver%tolerance, solved)
-      self%newton%steps_to_halve = 0
+      self%newton%steps_to_halve = 0                   ! the next step is first tried with patience, too
    end subroutine follow
 
    !> Free the operator and the fields.
