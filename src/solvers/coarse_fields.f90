@@ -10,7 +10,7 @@ module coarse_fields
    implicit none
    private
 
-   public :: coarse_grid, coarsen, mean_of_strips, new_row_means, refine_pressure, row_means_type
+   public :: coarse_grid, coarsen, mean_of_strips, new_row_means, refine_linearly, refine_pressure, row_means_type
 
    real(dp), parameter :: least_part = 1e-3_dp   !! of the nearest pressure that an interpolated one keeps at least
    integer, parameter :: ratio = 4         !! cells of the grid to a cell of the coarse one along a side, about
@@ -185,11 +185,7 @@ contains
       real(dp) :: part
       integer :: range(2), j, below
 
-      range = [1, 0]
-      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
-         below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
-      allocate (rows(coarse%nx, range(2) - range(1) + 1))
-      call fetch_rows(coarse, values, range, rows)
+      call fetch_rows_beside(coarse, fine, values, range, rows)
       call places_along_row(coarse, fine%nx, beside, parts)
 
       !$omp parallel default(none) shared(coarse, fine, rows, range, pressure, beside, parts) private(j, below, part, between) &
@@ -206,6 +202,50 @@ contains
       end do
       !$omp end parallel
    end subroutine refine_pressure
+
+   !> Interpolate a field of the coarse grid linearly between the centres of its cells. Beyond a free grid it is 0.
+   !> Collective.
+   subroutine refine_linearly(coarse, fine, values, threads, field)
+      type(grid_type), intent(in) :: coarse, fine
+      real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()]
+      integer, intent(in) :: threads
+      real(dp), intent(out) :: field(:, :)         !! [fine%nx, fine%rows()]
+      real(dp), allocatable :: rows(:, :), between(:), parts(:)
+      integer, allocatable :: beside(:, :)
+      real(dp) :: part
+      integer :: range(2), j, below
+
+      call fetch_rows_beside(coarse, fine, values, range, rows)
+      call places_along_row(coarse, fine%nx, beside, parts)
+
+      !$omp parallel default(none) shared(coarse, fine, rows, range, field, beside, parts) private(j, below, part, between) &
+      !$omp num_threads(threads)
+      allocate (between(0:coarse%nx), source=0.0_dp)
+      !$omp do
+      do j = 1, fine%rows()
+         associate (row => fine%first_row - 1 + j)
+            below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
+            part = part_above(fine%ny, coarse%ny, row)
+         end associate
+         between(1:) = (1.0_dp - part)*rows(:, below) + part*rows(:, below + 1)
+         field(:, j) = (1.0_dp - parts)*between(beside(2, :)) + parts*between(beside(3, :))
+      end do
+      !$omp end parallel
+   end subroutine refine_linearly
+
+   !> Fetch the coarse rows between which the rows of this process are interpolated. Collective.
+   subroutine fetch_rows_beside(coarse, fine, values, range, rows)
+      type(grid_type), intent(in) :: coarse, fine
+      real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()]
+      integer, intent(out) :: range(2)             !! first and last of these rows
+      real(dp), allocatable, intent(out) :: rows(:, :)   !! [coarse%nx, these rows]
+
+      range = [1, 0]
+      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
+         below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
+      allocate (rows(coarse%nx, range(2) - range(1) + 1))
+      call fetch_rows(coarse, values, range, rows)
+   end subroutine fetch_rows_beside
 
    !> Find the four coarse cells beside the centre of each cell of a row, 0 for those outside a free grid, and how far the
    !> centre lies from the second towards the third.

@@ -38,7 +38,7 @@
 module friction_cg
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
-   use fft_conv, only : convolution_type
+   use fft_conv, only : convolution_type, new_convolution
    use friction_cg_fast, only : friction_fast_type, new_friction_fast
    use friction_cg_gradient, only : friction_gradient_type
    use friction_cg_thesis, only : friction_thesis_type
@@ -47,7 +47,9 @@ module friction_cg
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_problem, only : friction_problem_type
    use friction_pull, only : friction_pull_type
+   use friction_start, only : coarse_friction_type, new_coarse_friction
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
+   use, intrinsic :: iso_fortran_env, only : int64
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
    use solver_result, only : solver_result_type
@@ -65,6 +67,10 @@ module friction_cg
    !> a residual near the round-off). Otherwise it would often end just below the tolerance, with an error of the
    !> friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
+   integer, parameter :: many_cells = 4000       !! in contact, for which a start from a coarser grid pays
+   real(dp), parameter :: least_ratio = 2.0_dp   !! cells of the grid to one of the coarser grid
+   real(dp), parameter :: rough_tolerance = 1.0e-2_dp   !! of the solution on the coarser grid
+   integer, parameter :: most_rough_iterations = 30
 
    !> The solver for one operator, kept from solve to solve. A variable of this type must not be copied.
    type :: friction_solver_type
@@ -80,6 +86,8 @@ module friction_cg
       !> units of DX'. Both are set by `solve`.
       real(dp) :: allowed_slip = 0.0_dp, reached_slip = 0.0_dp
       logical :: near = .false.                  !! T starts near the solution, as in a step like the last
+      !> Cells in contact from which a solve without a first T starts on a coarser grid.
+      integer :: coarse_start_from = huge(1)
       type(friction_pull_type) :: pull           !! prescribed total of T, and the position of the road
       class(friction_method_type), allocatable, private :: method
       type(friction_work_type), private :: work
@@ -117,6 +125,7 @@ contains
       case ('fast')
          allocate (fast)
          call new_friction_fast(fast, grid, operator%kernel, self%compliance, error)
+         self%coarse_start_from = many_cells
          call move_alloc(fast, self%method)
       case default
          call fail(error, error_input, "method = '"//chosen//"': must be 'fast', 'thesis' or 'gradient'")
@@ -124,7 +133,7 @@ contains
    end subroutine new_friction_solver
 
    !> Solve for T, starting from the T given.
-   subroutine solve(self, operator, law, fields, result)
+   recursive subroutine solve(self, operator, law, fields, result)
       class(friction_solver_type), intent(inout), target :: self
       type(convolution_type), intent(inout) :: operator
       type(friction_law_type), intent(in) :: law
@@ -132,13 +141,17 @@ contains
       type(solver_result_type), intent(out) :: result
       type(friction_problem_type) :: problem
       type(friction_goal_type) :: goal
+      integer(int64) :: coarse_ffts
 
       result%seconds = omp_get_wtime()
       result%required = max(self%tolerance, self%accepted)
       result%ffts = -operator%ffts - self%method%ffts
       goal = friction_goal_type(tolerance=self%tolerance, most_iterations=self%max_iterations)
       call set_problem(self, operator, law, fields, problem)
-      call problem%start(operator)
+      call problem%place_start(operator)
+      coarse_ffts = 0
+      if (pays_to_start_coarser(self, problem)) call start_on_coarse_grid(self, operator, problem, coarse_ffts)
+      call problem%measure_start(operator)
       if (10*problem%foreseen > problem%cells) &
          goal%tolerance = max(aim*self%tolerance, min(self%tolerance, resolved))
       self%method%stopped = .false.
@@ -166,9 +179,61 @@ contains
       result%load_error = self%pull%missing_part(problem)
       result%reason = reason(self, problem, result)
       call self%pull%detach(problem, operator)
-      result%ffts = result%ffts + operator%ffts + self%method%ffts
+      result%ffts = result%ffts + operator%ffts + self%method%ffts + coarse_ffts
       result%seconds = omp_get_wtime() - result%seconds
    end subroutine solve
+
+   !> Does it save time to find the first T on a coarser grid?
+   pure logical function pays_to_start_coarser(self, problem) result(yes)
+      class(friction_solver_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+
+      yes = problem%at_rest .and. problem%cells >= self%coarse_start_from .and. .not. any(self%pull%along) &
+         .and. problem%law%adhesive_pressure <= 0.0_dp .and. .not. associated(problem%fields%share)
+   end function pays_to_start_coarser
+
+   !> Let a solve from rest start from a rough solution on a coarser grid.
+   recursive subroutine start_on_coarse_grid(self, operator, problem, ffts)
+      class(friction_solver_type), intent(in) :: self
+      type(convolution_type), intent(inout) :: operator
+      type(friction_problem_type), intent(inout) :: problem
+      integer(int64), intent(out) :: ffts            !! in transforms of the grid
+      type(coarse_friction_type), target :: coarse
+      type(friction_solver_type) :: solver
+      type(convolution_type) :: coarse_operator
+      type(solver_result_type) :: result
+      type(error_type), allocatable :: error
+      real(dp) :: cells                              !! to a coarse one
+      integer :: c
+
+      ffts = 0
+      call new_coarse_friction(coarse, operator, problem%fields, problem%law%slope_effect)
+      cells = operator%grid%cells()/coarse%grid%cells()
+      if (cells < least_ratio) return
+      call new_convolution(coarse_operator, coarse%grid, operator%kernel, error)
+      if (.not. allocated(error)) call new_friction_solver(solver, coarse%grid, coarse_operator, error)
+      if (allocated(error)) return
+      if (self%periodic) then
+         do c = 1, 2
+            call coarse_operator%symbols%set_mean_mode(c, cells*operator%symbols%mean_mode(c))
+         end do
+      end if
+
+      solver%tolerance = max(rough_tolerance, self%tolerance)
+      solver%max_iterations = min(most_rough_iterations, self%max_iterations)
+      solver%settle = .false.
+      solver%least_scale = self%least_scale
+      call solver%solve(coarse_operator, problem%law, coarse%fields(), result)
+      ffts = nint(result%ffts/cells, int64)
+      if (result%converged) then
+         call coarse%give_start(problem%fields)
+         problem%fields%slip_unit = 0.0_dp           ! what was expected of the slip is worth less than this start
+         call problem%place_start(operator)
+      end if
+
+      call solver%destroy()
+      call coarse_operator%destroy()
+   end subroutine start_on_coarse_grid
 
    !> Make the problem from the caller's fields and settings. A road that is pulled is attached to its springs.
    subroutine set_problem(self, operator, law, fields, problem)

@@ -55,6 +55,7 @@ module friction_preconditioner
       real(dp) :: cross = 0.0_dp                         !! g.z_old
    contains
       procedure :: set_mean_stiffness
+      procedure :: share
       procedure :: apply
       procedure :: destroy
    end type friction_preconditioner_type
@@ -90,6 +91,15 @@ contains
       if (mean <= 0.0_dp) mean = self%half_wave
       call self%inverse%symbols%set_mean_compliance(1.0_dp/mean)
    end subroutine set_mean_stiffness
+
+   !> The size of a transform of the preconditioner, which has no padding, in transforms of the operator.
+   pure function share(self, operator)
+      class(friction_preconditioner_type), intent(in) :: self
+      type(convolution_type), intent(in) :: operator
+      real(dp) :: share
+
+      share = real(self%inverse%mx, dp)*self%inverse%my/(real(operator%mx, dp)*operator%my)
+   end function share
 
    !> Compute z from the residual, g.z and g.z_old.
    subroutine apply(self, problem)

@@ -64,6 +64,7 @@ module friction_problem
       type(friction_work_type), pointer :: work => null()
       type(row_constants_type) :: constants
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
+      logical :: at_rest = .false.           !! the first T is zero everywhere
       integer :: cells = 0                   !! in contact
       integer :: foreseen = 0                !! cells in contact that started along the slip that was expected
       integer :: slipping = 0                !! on the bound
@@ -73,7 +74,8 @@ module friction_problem
       real(dp) :: residual = 0.0_dp          !! largest |g| over that scale
       real(dp) :: change = 0.0_dp            !! |T' - T|/|T'| of the last move (thesis, eq. 3.15)
    contains
-      procedure :: start
+      procedure :: place_start
+      procedure :: measure_start
       procedure :: slope_at
       procedure :: place_on_bound
       procedure :: pressure_at
@@ -91,8 +93,8 @@ module friction_problem
 contains
 
    !> Gather the cells in contact, and project the first T: points that slipped in the step before are placed on their
-   !> bound, and others within it. Then compute the slip of this T and measure it.
-   subroutine start(self, operator)
+   !> bound, and others within it.
+   subroutine place_start(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
       real(dp), allocatable :: sizes(:)
@@ -113,13 +115,21 @@ contains
       end do
       self%cells = row_total(cells)
       self%foreseen = row_total(foreseen)
+      self%at_rest = .not. row_total(sizes) > 0.0_dp
       self%change = 0.0_dp
-      if (row_total(sizes) > 0.0_dp .or. associated(self%fields%past)) then
-         call self%update_slip(operator)
-      else
+   end subroutine place_start
+
+   !> Compute the slip of the first T, and measure it.
+   subroutine measure_start(self, operator)
+      class(friction_problem_type), intent(inout) :: self
+      type(convolution_type), intent(inout) :: operator
+
+      if (self%at_rest .and. .not. associated(self%fields%past)) then
          call start_from_rest(self)
+      else
+         call self%update_slip(operator)
       end if
-   end subroutine start
+   end subroutine measure_start
 
    !> Find the cells in contact, and give the fields of the solution their number.
    subroutine find_contact(self)
