@@ -2,7 +2,7 @@
 module test_coarse_start
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
-   use coarse_fields, only : coarse_grid, coarsen, refine_pressure
+   use coarse_fields, only : coarse_grid, coarsen, refine_linearly, refine_pressure
    use check, only : begin_suite, check_no_error, check_order, check_that, selected
    use kernels, only : normal_half_space
    use normal_cg, only : new_normal_solver, normal_solver_type
@@ -26,6 +26,7 @@ contains
          call the_solution_is_the_same(new_grid(250, 1, 1.0_dp, 1.0_dp, boundary_periodic))
       end if
       if (selected('short_waves_survive')) call short_waves_survive()
+      if (selected('linear_fields_are_exact')) call linear_fields_are_exact()
       if (selected('a_given_past_counts')) call a_given_past_counts()
       if (selected('it_saves_transforms')) call it_saves_transforms()
       if (selected('it_replaces_the_start_of_another_load')) call it_replaces_the_start_of_another_load()
@@ -111,6 +112,33 @@ contains
          if (k <= 2) call check_order(e1, '<=', 1.01_dp*problem%tolerance, what//': error recomputed')
       end do
    end subroutine the_solution_is_the_same
+
+   !> A field that is linear in the place is interpolated exactly between the centres of the outermost coarse cells, and
+   !> falls to 0 beyond the edge of a free grid. On a periodic grid a uniform field is exact everywhere.
+   subroutine linear_fields_are_exact()
+      type(grid_type) :: fine, coarse
+      real(dp), allocatable :: plane(:, :), rough(:, :), refined(:, :)
+      integer :: i, j
+
+      fine = new_grid(60, 48, 1.0_dp, 0.8_dp, boundary_free)
+      coarse = coarse_grid(fine)
+      allocate (plane(fine%nx, fine%ny), refined(fine%nx, fine%ny), rough(coarse%nx, coarse%ny))
+      do j = 1, fine%ny
+         do i = 1, fine%nx
+            plane(i, j) = 3.0_dp + 2.0_dp*(i - 0.5_dp)*fine%dx - (j - 0.5_dp)*fine%dy
+         end do
+      end do
+      call coarsen(fine, coarse, plane, 1, rough)
+      call refine_linearly(coarse, fine, rough, 1, refined)
+      call check_that(maxval(abs(refined(3:58, 3:46) - plane(3:58, 3:46))) < 1.0e-13_dp, 'a plane')
+      call check_that(all(refined(1, :) < plane(1, :)) .and. all(refined(:, fine%ny) < plane(:, fine%ny)), 'edges')
+
+      fine%boundary = boundary_periodic
+      coarse%boundary = boundary_periodic
+      rough(:, :) = 7.0_dp
+      call refine_linearly(coarse, fine, rough, 1, refined)
+      call check_that(maxval(abs(refined - 7.0_dp)) < 1.0e-14_dp, 'a uniform field')
+   end subroutine linear_fields_are_exact
 
    !> A given traction of the past is a part of the problem on the coarser grid, too.
    subroutine a_given_past_counts()

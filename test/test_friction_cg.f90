@@ -9,7 +9,7 @@ module test_friction_cg
    use asperity_threads, only : set_threads, thread_count
    use friction_bounds, only : largest_excess, return_tractions
    use kernels, only : tangential_half_space
-   use asperity_precision, only : dp, int8, pi
+   use asperity_precision, only : dp, int64, int8, pi
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use, intrinsic :: iso_c_binding, only : c_int
    use solver_result, only : solver_result_type
@@ -57,6 +57,8 @@ contains
       if (selected('uniform_contact_moves_by_mean_mode')) call uniform_contact_moves_by_mean_mode()
       if (selected('own_solution_is_kept')) call own_solution_is_kept()
       if (selected('expected_slip_is_a_good_start')) call expected_slip_is_a_good_start()
+      if (selected('a_start_on_a_coarser_grid_changes_nothing')) call a_start_on_a_coarser_grid_changes_nothing()
+      if (selected('a_start_on_a_coarser_grid_saves_products')) call a_start_on_a_coarser_grid_saves_products()
       if (selected('past_traction_is_like_a_drive')) call past_traction_is_like_a_drive()
       if (selected('block_dragged_into_full_slip_and_back')) &
          call block_dragged_into_full_slip_and_back()
@@ -902,6 +904,76 @@ contains
          end do
       end do
    end subroutine expected_slip_is_a_good_start
+
+   !> Rough contacts on square and oblong cells, flat and sloping, periodic and free, in two dimensions and in one: the
+   !> tractions are the same whether a solve from rest starts on a coarser grid or not. The coarser grid of the last one
+   !> is the grid itself, because its cells are joined across their longer side only.
+   subroutine a_start_on_a_coarser_grid_changes_nothing()
+      integer, parameter :: cells(2, 8) = reshape([60, 48, 61, 37, 60, 48, 50, 41, 90, 24, 24, 90, 300, 1, 300, 1], [2, 8])
+      real(dp), parameter :: sides(2, 8) = reshape([1.0_dp, 0.8_dp, 1.0_dp, 0.6_dp, 1.0_dp, 0.8_dp, 1.0_dp, 0.8_dp, &
+         1.0_dp, 2.0_dp, 1.0_dp, 1.0_dp, 1.0_dp, 0.01_dp, 1.0_dp, 2.0e-4_dp], [2, 8])
+      integer, parameter :: boundary(8) = [boundary_periodic, boundary_free, boundary_periodic, boundary_free, &
+         boundary_periodic, boundary_periodic, boundary_periodic, boundary_periodic]
+      real(dp), parameter :: slopes(8) = [0.0_dp, 0.0_dp, 0.2_dp, 0.1_dp, 0.1_dp, 0.0_dp, 0.1_dp, 0.0_dp]
+      type(case_type) :: self
+      real(dp), allocatable :: tx(:, :), ty(:, :), past(:, :, :)
+      real(dp) :: bad
+      integer :: k, from
+
+      do k = 1, size(boundary)
+         call new_case(self, cells(1, k), cells(2, k), sides(1, k), sides(2, k), boundary(k), 0.4_dp, &
+            merge(0.3_dp, 0.0_dp, k > 2))
+         call set_rough(self, k, slopes(k), 0.2_dp)
+         self%law = new_friction_law('coulomb_orowan', 0.4_dp, 0.5_dp, 0.0_dp, slopes(k) > 0.0_dp, .true.)
+         self%drive_x = merge(0.02_dp, 0.06_dp, k == 1)*sum(self%p)/size(self%p)
+         self%drive_y = 0.5_dp*self%drive_x
+         allocate (past(cells(1, k), 2, cells(2, k)), source=0.0_dp)
+         if (mod(k, 2) == 0) past(:, 1, :) = -0.05_dp*self%p
+         do from = 1, 2
+            self%solver%coarse_start_from = merge(1, huge(1), from == 1)
+            self%tx = 0.0_dp
+            self%ty = 0.0_dp
+            where (self%contact /= contact_open) self%contact = contact_stick
+            call solve_case(self, past)
+            call check_that(self%result%converged, 'converged, '//trim(self%result%reason))
+            if (from == 1) tx = self%tx
+            if (from == 1) ty = self%ty
+         end do
+         call check_that(count(self%contact == contact_slip) > 20 .and. count(self%contact == contact_stick) > 20, &
+            'stick and slip')
+         bad = maxval(hypot(self%tx - tx, self%ty - ty))/maxval(hypot(tx, ty))
+         call check_order(bad, '<', 1e-6_dp, 'the same tractions')
+         deallocate (tx, ty, past)
+         call end_case(self)
+      end do
+   end subroutine a_start_on_a_coarser_grid_changes_nothing
+
+   !> A sphere from rest to half of full slip takes a quarter fewer transforms with a start on a coarser grid. Where the
+   !> start is given, or the road is pulled, the solve begins on the grid.
+   subroutine a_start_on_a_coarser_grid_saves_products()
+      type(case_type) :: self
+      real(dp), parameter :: mu = 0.4_dp
+      integer(int64) :: counts(4)
+      integer :: k
+
+      call new_case(self, 128, 128, 2.5_dp, 2.5_dp, boundary_free, 0.42_dp, 0.0_dp)
+      call set_hertz(self)
+      self%law = new_friction_law('coulomb', mu, 0.0_dp, 0.0_dp, .false., .true.)
+      self%drive_x = (1.0_dp - 0.5_dp**(2.0_dp/3.0_dp))*full_slip(self, mu, 0.42_dp)
+      self%solver%tolerance = 1e-5_dp
+      do k = 1, 4
+         self%solver%coarse_start_from = merge(huge(1), 1000, mod(k, 2) == 1)
+         self%tx = merge(0.0_dp, 0.01_dp*self%p, k < 3)
+         self%ty = 0.0_dp
+         where (self%contact /= contact_open) self%contact = contact_stick
+         call solve_case(self)
+         call check_that(self%result%converged, 'converged')
+         counts(k) = self%result%ffts
+      end do
+      call check_order(real(counts(2), dp), '<', 0.75_dp*counts(1), 'from rest: transforms')
+      call check_that(counts(4) == counts(3), 'from a given start: the same number of transforms')
+      call end_case(self)
+   end subroutine a_start_on_a_coarser_grid_saves_products
 
    !> A traction of the past T_h is equivalent to -A T_h in the motion.
    subroutine past_traction_is_like_a_drive()

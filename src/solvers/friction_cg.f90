@@ -26,10 +26,15 @@
 !> against v. It is relative to the largest of several scales: the rms of DX in the contact, that of A T, the offset
 !> of a spring that pulls the road, and `least_scale`.
 !>
+!> A solve by 'fast' that starts without any traction begins on a coarser grid if there are many cells in contact (module
+!> `friction_start`). Otherwise its first iterations, half of them or more, would only find out which cells slip. Where the
+!> road is pulled, with adhesion, and where cells touch in parts it begins on the grid itself.
+!>
 !> Memory in addition to the caller's fields, in fields of doubles: two for the spectrum of the operator (four on a free
 !> grid), two for that of the preconditioner, 3/4 for the symbols of the latter, and about one for the prediction of the
 !> length of a step (module `friction_form`); and 18 fields that contain only the cells in contact, with rows as long as
-!> the longest one (module `contact_runs`). The fallback takes four more of these from its first use on.
+!> the longest one (module `contact_runs`). The fallback takes four more of these from its first use on. A start on a
+!> coarser grid takes a sixteenth of all this, and of the caller's fields, and frees it again.
 !>
 !> examples/friction_iterations and docs/benchmarks.md show how the number of iterations depends on the mesh. An
 !> iteration of 'fast' takes one product of the operator, and one product of its preconditioner on the grid without
@@ -183,13 +188,14 @@ contains
       result%seconds = omp_get_wtime() - result%seconds
    end subroutine solve
 
-   !> Does it save time to find the first T on a coarser grid?
+   !> Does it save time to find the first T on a coarser grid? Without friction it is zero in any case.
    pure logical function pays_to_start_coarser(self, problem) result(yes)
       class(friction_solver_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
 
-      yes = problem%at_rest .and. problem%cells >= self%coarse_start_from .and. .not. any(self%pull%along) &
-         .and. problem%law%adhesive_pressure <= 0.0_dp .and. .not. associated(problem%fields%share)
+      yes = problem%at_rest .and. problem%bounds > 0.0_dp .and. problem%cells >= self%coarse_start_from &
+         .and. .not. any(self%pull%along) .and. .not. associated(problem%fields%share) &
+         .and. problem%law%adhesive_pressure <= 0.0_dp
    end function pays_to_start_coarser
 
    !> Let a solve from rest start from a rough solution on a coarser grid.

@@ -65,6 +65,7 @@ module friction_problem
       type(row_constants_type) :: constants
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
       logical :: at_rest = .false.           !! the first T is zero everywhere
+      real(dp) :: bounds = 0.0_dp            !! sum of the bounds, Pa
       integer :: cells = 0                   !! in contact
       integer :: foreseen = 0                !! cells in contact that started along the slip that was expected
       integer :: slipping = 0                !! on the bound
@@ -97,24 +98,26 @@ contains
    subroutine place_start(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
-      real(dp), allocatable :: sizes(:)
+      real(dp), allocatable :: sizes(:), bounds(:)
       integer, allocatable :: cells(:), foreseen(:)
       integer :: j
 
-      allocate (sizes(self%rows), cells(self%rows), foreseen(self%rows))
+      allocate (sizes(self%rows), bounds(self%rows), cells(self%rows), foreseen(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope_effect .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, deepest_inside=deepest_inside)
       call find_contact(self)
-      !$omp parallel do default(none) shared(self, operator, sizes, cells, foreseen) private(j) &
+      !$omp parallel do default(none) shared(self, operator, sizes, bounds, cells, foreseen) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
          call gather_row(self, j)
+         bounds(j) = sum(self%work%site(:, 4, j))
          call start_row(self, j, cells(j), foreseen(j), sizes(j))
          call self%transform_row(operator, j)
       end do
       self%cells = row_total(cells)
       self%foreseen = row_total(foreseen)
+      self%bounds = row_total(bounds)
       self%at_rest = .not. row_total(sizes) > 0.0_dp
       self%change = 0.0_dp
    end subroutine place_start
