@@ -79,6 +79,7 @@ contains
       call new_normal_solver(solver, grid, normal_half_space(poisson), error, mixed)
       call check_no_error(error, 'a solver')
       solver%coarse_start_from = merge(0.0_dp, huge(1.0_dp), coarse)
+      solver%replace_start_from = solver%coarse_start_from
       call solver%solve(problem, height, solution%pressure, solution%gap, solution%level, solution%outcome, past)
       call solver%destroy()
    end subroutine run_from

@@ -77,7 +77,8 @@ module normal_cg
    !> copied.
    type, extends(contact_solver_type) :: normal_solver_type
       logical :: mixed = .false.                      !! products of steps in single precision
-      real(dp) :: coarse_start_from = 5e5_dp            !! cells from which a solve starts on a coarser grid
+      real(dp) :: coarse_start_from = 4e4_dp          !! cells from which a solve without a start begins on a coarser grid
+      real(dp) :: replace_start_from = 5e5_dp         !! the same for a solve with a start that is far away
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
       real(dp), allocatable, private :: step(:, :)    !! s, Pa [nx, rows]; first the trial pressure
@@ -250,8 +251,8 @@ contains
 
    end subroutine solve
 
-   !> On a large grid, replace a start that is missing or far away by the pressure of a rough solution on a coarser grid, if
-   !> that is worth the effort.
+   !> Replace a start that is missing, or on a large grid one that is far away, by the pressure of a rough solution on a
+   !> coarser grid, if that is worth the effort.
    recursive subroutine start_on_coarse_grid(self, task, height, pressure, effort, past)
       class(normal_solver_type), intent(in) :: self
       type(normal_problem_type), intent(inout) :: task
@@ -266,6 +267,7 @@ contains
       effort = 0.0_dp
       if (self%grid%cells() < self%coarse_start_from) return
       if (task%control == control_pressure .and. task%target <= 0.0_dp) return
+      if (task%warm .and. self%grid%cells() < self%replace_start_from) return
       if (task%warm .and. .not. is_far(task, pressure)) return
       task%warm = .false.
       task%displaced = .false.
