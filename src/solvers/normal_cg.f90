@@ -68,6 +68,7 @@ module normal_cg
 
    ! The start from a coarser grid.
    real(dp), parameter :: least_roughness = 0.9_dp    !! rms height of the coarser road over that of the road
+   real(dp), parameter :: few_overlap = 50.0_dp       !! coarse cells that a given approach brings into overlap
    real(dp), parameter :: rough_tolerance = 1e-2_dp   !! of its solution: the details belong to the finer grid
    integer, parameter :: most_rough_iterations = 30
    real(dp), parameter :: far_load = 0.05_dp          !! change of the load for which a given start is no better
@@ -275,6 +276,7 @@ contains
       allocate (road(coarse%nx, coarse%rows()))
       call coarsen(self%grid, coarse, height, self%operator%threads, road)
       if (field_rms(road, field_mean(road)) < least_roughness*task%rms_height) return
+      if (task%control == control_approach .and. field_count(road + (task%target - task%datum) > 0.0_dp) < few_overlap) return
       if (present(past)) then
          allocate (memory, mold=road)
          call coarsen(self%grid, coarse, past, self%operator%threads, memory)
