@@ -101,13 +101,11 @@ def check(data: dict[str, Any], quick: bool) -> None:
             # The area is a count of cells; with 24 cells per side the contact is 16 cells wide.
             assert np.abs(stick - known).max() < (0.06 if quick else 0.03), \
                 f"{method}: {ratio}: {np.abs(stick - known).max():.3f} of the area off"
-    # An iteration takes a product of the operator and one of the preconditioner, with four
-    # transforms each. The aim was 30 products at half of full slip.
-    half = data["fast_iterations"][list(data["ratios"]).index(0.5)]
-    assert half.max() <= 20, f"fast: {half.max()} iterations at half of full slip"
-    assert data["fast_iterations"].max() <= 22, f"fast: {data['fast_iterations'].max()} iterations"
-    assert data["fast_ffts"].max() <= 240, f"fast: {data['fast_ffts'].max()} transforms"
-    assert data["fast_exponent"].max() < 0.2, f"fast grows: {data['fast_exponent']}"
+    # From 2000 cells in contact on, the start on a coarser grid keeps the iterations from growing.
+    assert data["fast_iterations"].max() <= 16, f"fast: {data['fast_iterations'].max()} iterations"
+    assert data["fast_ffts"].max() <= 110, f"fast: {data['fast_ffts'].max()} transforms"
+    most = 0.2 if quick else 0.05
+    assert data["fast_exponent"].max() < most, f"fast grows: {data['fast_exponent']}"
     # 'thesis' has no preconditioner. The symbol of the operator is 1/|q|, so that its condition
     # number grows with the number of cells along a line, N^0.5, and the iterations of conjugate
     # gradients at least with its root, N^0.25. The thesis finds N^0.4. 'fast' does not have this
@@ -118,10 +116,8 @@ def check(data: dict[str, Any], quick: bool) -> None:
         if not quick:
             assert slow < 0.65, f"{ratio}: 'thesis' grows with the power {slow:.2f}"
         # Therefore 'thesis' takes more and more iterations than 'fast' as the mesh grows. It also
-        # takes more transforms, although an iteration of 'fast' takes ten and one of 'thesis' six.
-        # Here it takes 6 times the iterations and 3 times the transforms with 48 cells, and 16 and
-        # 9 times with 256 cells.
-        for name, least in (("iterations", 4 if quick else 12), ("ffts", 2.5 if quick else 7)):
+        # takes more transforms: an iteration of 'thesis' takes six, and one of 'fast' about five.
+        for name, least in (("iterations", 4 if quick else 25), ("ffts", 4 if quick else 25)):
             behind = np.median(data[f"thesis_{name}"][number][-1]) / np.median(
                 data[f"fast_{name}"][number][-1])
             assert behind > least, f"{ratio}: {name} of 'thesis' only {behind:.1f} times as many"

@@ -72,7 +72,7 @@ module friction_cg
    !> a residual near the round-off). Otherwise it would often end just below the tolerance, with an error of the
    !> friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
-   integer, parameter :: many_cells = 4000       !! in contact, for which a start from a coarser grid pays
+   integer, parameter :: many_cells = 2000       !! in contact, for which a start from a coarser grid pays
    real(dp), parameter :: least_ratio = 2.0_dp   !! cells of the grid to one of the coarser grid
    real(dp), parameter :: rough_tolerance = 1.0e-2_dp   !! of the solution on the coarser grid
    integer, parameter :: most_rough_iterations = 30
