@@ -99,7 +99,7 @@ contains
       do k = 1, 4
          if (k == 3) then
             problem%control = control_approach
-            problem%target = -0.6_dp*maxval(height)
+            problem%target = -0.3_dp*maxval(height)
          end if
          what = to_text(grid%nx)//' x '//to_text(grid%ny)//' cells, variant '//to_text(k)
          call run_from(.false., grid, problem, height, s, modulo(k, 2) == 0)

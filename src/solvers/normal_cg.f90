@@ -68,7 +68,7 @@ module normal_cg
 
    ! The start from a coarser grid.
    real(dp), parameter :: least_roughness = 0.9_dp    !! rms height of the coarser road over that of the road
-   real(dp), parameter :: few_overlap = 50.0_dp       !! coarse cells that a given approach brings into overlap
+   real(dp), parameter :: few_overlap = 8.0_dp        !! coarse cells that a given approach brings into overlap
    real(dp), parameter :: rough_tolerance = 1e-2_dp   !! of its solution: the details belong to the finer grid
    integer, parameter :: most_rough_iterations = 30
    real(dp), parameter :: far_load = 0.05_dp          !! change of the load for which a given start is no better
