@@ -106,7 +106,8 @@ contains
       call table%add(prefix//'passes', row%passes, 'passes of a step with friction')
       call table%add(prefix//'residual_coupling', row%residual_coupling, '1', &
          'mismatch between the road under the computed surface and the road solved on')
-      call table%add(prefix//'ffts', row%ffts, '1', 'real transforms of the size of the grid')
+      call table%add(prefix//'ffts', row%ffts, '1', &
+         'real transforms of the size of the operator; smaller ones count in part')
       call table%add(prefix//'seconds', row%seconds, 's', 'wall time of the solvers')
    end subroutine list_section_3
 

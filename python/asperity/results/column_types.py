@@ -50,7 +50,7 @@ class RowColumns:
     residual_tangential: float  # residual of the tangential solution, recomputed
     passes: int  # passes of a step with friction
     residual_coupling: float  # mismatch between the road under the computed surface and the road solved on
-    ffts: float  # real transforms of the size of the grid
+    ffts: float  # real transforms of the size of the operator; smaller ones count in part
     seconds: float  # wall time of the solvers, s
 
 
@@ -93,5 +93,5 @@ class HistoryColumns:
     residual_tangential: NDArray[np.float64]  # residual of the tangential solution, recomputed
     passes: NDArray[np.int32]  # passes of a step with friction
     residual_coupling: NDArray[np.float64]  # mismatch between the road under the computed surface and the road solved on
-    ffts: NDArray[np.float64]  # real transforms of the size of the grid
+    ffts: NDArray[np.float64]  # real transforms of the size of the operator; smaller ones count in part
     seconds: NDArray[np.float64]  # wall time of the solvers, s
