@@ -234,6 +234,11 @@ contains
          end if
          call check_same_pressure(grid, problem, height, 'case '//to_text(k))
       end do
+
+      call rough_problem(grid, 16.0_dp, loads(2), problem, height)
+      problem%control = control_approach
+      problem%target = -0.995_dp*maxval(height)
+      call check_same_pressure(grid, problem, height, 'a few cells in overlap')
    end subroutine not_where_it_cannot_help
 
    !> Check that the pressure has the same bits with and without a start from a coarser grid.

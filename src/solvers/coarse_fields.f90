@@ -1,4 +1,4 @@
-!> Fields on a coarser grid: means over its cells, and the interpolation of a pressure back to the grid.
+!> Fields on a coarser grid: means over its cells, and the interpolation of a pressure or another field back to the grid.
 !>
 !> The number of cells of the grid need not be a multiple of that of the coarser one: a coarse cell takes of a
 !> cell on its edge the part that lies in it. Processes share the rows of both grids, each grid by its own rule.
@@ -180,27 +180,8 @@ contains
       real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()], Pa
       integer, intent(in) :: threads
       real(dp), intent(out) :: pressure(:, :)      !! [fine%nx, fine%rows()], Pa
-      real(dp), allocatable :: rows(:, :), between(:), parts(:)
-      integer, allocatable :: beside(:, :)
-      real(dp) :: part
-      integer :: range(2), j, below
 
-      call fetch_rows_beside(coarse, fine, values, range, rows)
-      call places_along_row(coarse, fine%nx, beside, parts)
-
-      !$omp parallel default(none) shared(coarse, fine, rows, range, pressure, beside, parts) private(j, below, part, between) &
-      !$omp num_threads(threads)
-      allocate (between(0:coarse%nx), source=0.0_dp)
-      !$omp do
-      do j = 1, fine%rows()
-         associate (row => fine%first_row - 1 + j)
-            below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
-            part = part_above(fine%ny, coarse%ny, row)
-         end associate
-         between(1:) = interpolate(part, rows(:, below - 1), rows(:, below), rows(:, below + 1), rows(:, below + 2))
-         call refine_row(between, beside, parts, pressure(:, j))
-      end do
-      !$omp end parallel
+      call refine(coarse, fine, values, threads, .true., pressure)
    end subroutine refine_pressure
 
    !> Interpolate a field of the coarse grid linearly between the centres of its cells. Beyond a free grid it is 0.
@@ -210,16 +191,31 @@ contains
       real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()]
       integer, intent(in) :: threads
       real(dp), intent(out) :: field(:, :)         !! [fine%nx, fine%rows()]
+
+      call refine(coarse, fine, values, threads, .false., field)
+   end subroutine refine_linearly
+
+   !> Interpolate a pressure or any other field between the centres of the coarse cells. Collective.
+   subroutine refine(coarse, fine, values, threads, is_pressure, field)
+      type(grid_type), intent(in) :: coarse, fine
+      real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()]
+      integer, intent(in) :: threads
+      logical, intent(in) :: is_pressure
+      real(dp), intent(out) :: field(:, :)         !! [fine%nx, fine%rows()]
       real(dp), allocatable :: rows(:, :), between(:), parts(:)
       integer, allocatable :: beside(:, :)
       real(dp) :: part
       integer :: range(2), j, below
 
-      call fetch_rows_beside(coarse, fine, values, range, rows)
+      range = [1, 0]
+      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
+         below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
+      allocate (rows(coarse%nx, range(2) - range(1) + 1))
+      call fetch_rows(coarse, values, range, rows)
       call places_along_row(coarse, fine%nx, beside, parts)
 
-      !$omp parallel default(none) shared(coarse, fine, rows, range, field, beside, parts) private(j, below, part, between) &
-      !$omp num_threads(threads)
+      !$omp parallel default(none) shared(coarse, fine, rows, range, is_pressure, field, beside, parts) &
+      !$omp private(j, below, part, between) num_threads(threads)
       allocate (between(0:coarse%nx), source=0.0_dp)
       !$omp do
       do j = 1, fine%rows()
@@ -227,25 +223,13 @@ contains
             below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
             part = part_above(fine%ny, coarse%ny, row)
          end associate
-         between(1:) = (1.0_dp - part)*rows(:, below) + part*rows(:, below + 1)
-         field(:, j) = (1.0_dp - parts)*between(beside(2, :)) + parts*between(beside(3, :))
+         between(1:) = interpolate(is_pressure, part, rows(:, below - 1), rows(:, below), rows(:, below + 1), &
+            rows(:, below + 2))
+         field(:, j) = interpolate(is_pressure, parts, between(beside(1, :)), between(beside(2, :)), &
+            between(beside(3, :)), between(beside(4, :)))
       end do
       !$omp end parallel
-   end subroutine refine_linearly
-
-   !> Fetch the coarse rows between which the rows of this process are interpolated. Collective.
-   subroutine fetch_rows_beside(coarse, fine, values, range, rows)
-      type(grid_type), intent(in) :: coarse, fine
-      real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()]
-      integer, intent(out) :: range(2)             !! first and last of these rows
-      real(dp), allocatable, intent(out) :: rows(:, :)   !! [coarse%nx, these rows]
-
-      range = [1, 0]
-      if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
-         below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
-      allocate (rows(coarse%nx, range(2) - range(1) + 1))
-      call fetch_rows(coarse, values, range, rows)
-   end subroutine fetch_rows_beside
+   end subroutine refine
 
    !> Find the four coarse cells beside the centre of each cell of a row, 0 for those outside a free grid, and how far the
    !> centre lies from the second towards the third.
@@ -263,33 +247,23 @@ contains
       end do
    end subroutine places_along_row
 
-   !> Interpolate the pressure of a row.
-   pure subroutine refine_row(values, beside, parts, pressure)
-      real(dp), intent(in) :: values(0:)           !! [0:coarse%nx], 0 at 0, Pa
-      integer, intent(in) :: beside(:, :)          !! [4, cells], as `places_along_row` gives it
-      real(dp), intent(in) :: parts(:)             !! [cells], likewise
-      real(dp), intent(out) :: pressure(:)         !! [cells], Pa
-      integer :: i
-
-      do i = 1, size(pressure)
-         pressure(i) = interpolate(parts(i), values(beside(1, i)), values(beside(2, i)), values(beside(3, i)), &
-            values(beside(4, i)))
-      end do
-   end subroutine refine_row
-
-   !> Interpolate between the middle two of four equidistant pressures by the cubic polynomial through all four. The
-   !> result is 0 where the nearest one is 0, and positive elsewhere.
-   elemental function interpolate(part, before, below, above, beyond) result(value)
-      real(dp), intent(in) :: part                 !! of the way from the second pressure to the third, 0 to 1
-      real(dp), intent(in) :: before, below, above, beyond   !! Pa
+   !> Interpolate between the middle two of four equidistant values: linearly, or a pressure by the cubic polynomial
+   !> through all four. A pressure is 0 where the nearest one is 0, and positive elsewhere.
+   elemental function interpolate(is_pressure, part, before, below, above, beyond) result(value)
+      logical, intent(in) :: is_pressure
+      real(dp), intent(in) :: part                 !! of the way from the second value to the third, 0 to 1
+      real(dp), intent(in) :: before, below, above, beyond
       real(dp) :: value
       real(dp) :: nearest
 
-      value = 0.0_dp
+      value = (1.0_dp - part)*below + part*above
+      if (.not. is_pressure) return
       nearest = merge(below, above, part < 0.5_dp)
-      if (nearest <= 0.0_dp) return
-      value = (1.0_dp - part)*below + part*above &
-         - part*(1.0_dp - part)*((2.0_dp - part)*(before - 2.0_dp*below + above) &
+      if (nearest <= 0.0_dp) then
+         value = 0.0_dp
+         return
+      end if
+      value = value - part*(1.0_dp - part)*((2.0_dp - part)*(before - 2.0_dp*below + above) &
          + (1.0_dp + part)*(below - 2.0_dp*above + beyond))/6.0_dp
       value = max(value, least_part*nearest)
    end function interpolate

@@ -134,8 +134,8 @@ contains
          if (problem%solved(goal%tolerance)) exit
       end do
       ! The rounding of this sum must not depend on earlier solves: a run that is continued has the same counts.
-      self%ffts = self%ffts + nint(self%preconditioner%share(operator)*(self%preconditioner%inverse%ffts - before), int64) &
-         + self%form%transforms(since=coarse_before)
+      self%ffts = self%ffts + self%form%transforms(since=coarse_before) &
+         + nint(self%preconditioner%transform_size(operator)*(self%preconditioner%inverse%ffts - before), int64)
    end subroutine iterate
 
    !> Iterate by conjugate gradients until the problem is solved, the residual stalls, there is no direction of descent,

@@ -55,7 +55,7 @@ module friction_preconditioner
       real(dp) :: cross = 0.0_dp                         !! g.z_old
    contains
       procedure :: set_mean_stiffness
-      procedure :: share
+      procedure :: transform_size
       procedure :: apply
       procedure :: destroy
    end type friction_preconditioner_type
@@ -93,13 +93,13 @@ contains
    end subroutine set_mean_stiffness
 
    !> The size of a transform of the preconditioner, which has no padding, in transforms of the operator.
-   pure function share(self, operator)
+   pure function transform_size(self, operator) result(size)
       class(friction_preconditioner_type), intent(in) :: self
       type(convolution_type), intent(in) :: operator
-      real(dp) :: share
+      real(dp) :: size
 
-      share = real(self%inverse%mx, dp)*self%inverse%my/(real(operator%mx, dp)*operator%my)
-   end function share
+      size = real(self%inverse%mx, dp)*self%inverse%my/(real(operator%mx, dp)*operator%my)
+   end function transform_size
 
    !> Compute z from the residual, g.z and g.z_old.
    subroutine apply(self, problem)

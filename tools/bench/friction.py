@@ -7,8 +7,8 @@
 
 First Mindlin's sphere (G = 200 MPa, nu = 0.42, R = 50 mm, 9.196 N; thesis, fig. 3.5) brought to
 half of full slip in one step with one pass, on meshes that grow: tangential iterations, and all
-transforms of the step. An iteration takes a product of the operator and one of the preconditioner
-(four transforms each).
+transforms of the step. An iteration takes a product of the operator and one of the preconditioner,
+four transforms each; those of the preconditioner, which has no padding, count as a quarter here.
 
 Then the road of two scales (examples/two_scale_road), whole or its first steps of sliding: the cost
 of a step, by the part of the contact that sticks. With `--result` the table is that of an existing
