@@ -28,8 +28,8 @@
 !>
 !> A solve by 'fast' that starts without any traction begins on a coarser grid if there are many cells in contact (module
 !> `friction_start`). Otherwise its first iterations, half of them or more, would only find out which cells slip. Where the
-!> road is pulled, with adhesion, where cells touch in parts, and where a slope is too steep for zero traction (steeper than
-!> mu), it begins on the grid itself.
+!> road is pulled, with adhesion, where cells touch in parts, and where half of the cells or more are expected to slip far
+!> (and therefore start along that slip), it begins on the grid itself.
 !>
 !> Memory in addition to the caller's fields, in fields of doubles: two for the spectrum of the operator (four on a free
 !> grid), two for that of the preconditioner, 3/4 for the symbols of the latter, and about one for the prediction of the
@@ -194,7 +194,7 @@ contains
       class(friction_solver_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
 
-      yes = problem%at_rest .and. problem%bounds > 0.0_dp .and. problem%cells >= self%coarse_start_from &
+      yes = problem%from_rest .and. problem%bounds > 0.0_dp .and. problem%cells >= self%coarse_start_from &
          .and. .not. any(self%pull%along) .and. .not. associated(problem%fields%share) &
          .and. problem%law%adhesive_pressure <= 0.0_dp
    end function pays_to_start_coarser

@@ -64,6 +64,7 @@ module friction_problem
       type(friction_work_type), pointer :: work => null()
       type(row_constants_type) :: constants
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
+      logical :: from_rest = .false.         !! the T given is zero everywhere, and few cells are expected to slip far
       logical :: at_rest = .false.           !! the first T is zero everywhere
       real(dp) :: bounds = 0.0_dp            !! sum of the bounds, Pa
       integer :: cells = 0                   !! in contact
@@ -98,26 +99,27 @@ contains
    subroutine place_start(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
-      real(dp), allocatable :: sizes(:), bounds(:)
+      real(dp), allocatable :: given(:), sizes(:), bounds(:)
       integer, allocatable :: cells(:), foreseen(:)
       integer :: j
 
-      allocate (sizes(self%rows), bounds(self%rows), cells(self%rows), foreseen(self%rows))
+      allocate (given(self%rows), sizes(self%rows), bounds(self%rows), cells(self%rows), foreseen(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope_effect .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, deepest_inside=deepest_inside)
       call find_contact(self)
-      !$omp parallel do default(none) shared(self, operator, sizes, bounds, cells, foreseen) private(j) &
+      !$omp parallel do default(none) shared(self, operator, given, sizes, bounds, cells, foreseen) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
          call gather_row(self, j)
          bounds(j) = sum(self%work%site(:, 4, j))
-         call start_row(self, j, cells(j), foreseen(j), sizes(j))
+         call start_row(self, j, cells(j), foreseen(j), given(j), sizes(j))
          call self%transform_row(operator, j)
       end do
       self%cells = row_total(cells)
       self%foreseen = row_total(foreseen)
       self%bounds = row_total(bounds)
+      self%from_rest = 2*self%foreseen < self%cells .and. .not. row_total(given) > 0.0_dp
       self%at_rest = .not. row_total(sizes) > 0.0_dp
       self%change = 0.0_dp
    end subroutine place_start
@@ -192,22 +194,25 @@ contains
    end subroutine gather_row
 
    !> Project the first T of a row.
-   subroutine start_row(self, j, cells, foreseen, size)
+   subroutine start_row(self, j, cells, foreseen, given, size)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
       integer, intent(out) :: foreseen             !! cells in contact that start along the slip that is expected
-      real(dp), intent(out) :: size                !! |T|^2, Pa^2
+      real(dp), intent(out) :: given               !! |T|^2 of the T given, Pa^2
+      real(dp), intent(out) :: size                !! |T|^2 of the first T, Pa^2
       real(dp) :: limit, s, t(2)
       integer :: i
 
       cells = 0
       foreseen = 0
+      given = 0.0_dp
       size = 0.0_dp
       do i = 1, self%width
          t = 0.0_dp
          if (self%work%contact(i, j) /= contact_open) then
             t = self%work%traction(i, :, j)
+            given = given + (t(1)**2 + t(2)**2)
             ! Slipping points are returned to their bound from both sides, others only from outside.
             limit = merge(deepest_inside, 1.0_dp, self%work%contact(i, j) == contact_slip)
             if (self%fields%slip_unit > 0.0_dp) call start_along_slip(self, i, j, t, limit, foreseen)
