@@ -118,3 +118,20 @@ def test_cell_without_pressure_does_not_slip_inside_its_bound(tmp_path):
     for state in converged:
         slips = (state.pressure == 0) & (state.contact == 2)
         assert not np.any(np.hypot(state.traction_x, state.traction_y)[slips] > 0)
+
+
+@pytest.mark.parametrize(("slope", "wedges"), [(1.5, True), (0.3, False)])
+def test_failed_tangential_solve_names_slopes_that_wedge(program, tmp_path, slope, wedges):
+    """Where few iterations are allowed, the message names slopes above 1/coefficient, if any."""
+    (tmp_path / "case.nml").write_text(
+        "&grid nx = 32, ny = 24, lx = 1e-3 /\n"
+        "&surface shape = 'self_affine', hurst = 0.8, wavelength_long = 4e-4, "
+        f"wavelength_short = 2e-4, rms_slope = {slope} /\n"
+        "&material shear_modulus = 1e6 /\n&friction law = 'coulomb', coefficient = 0.7 /\n"
+        "&phase pressure = 2e5, velocity_x = 1e-3, duration = 1e-3, steps = 1 /\n"
+        "&solver max_iterations = 6, tolerance = 1e-5, passes = 1, threads = 1 /\n")
+    done = subprocess.run([program, "run", "case.nml", "--quiet"], cwd=tmp_path,
+                          capture_output=True, text=True, check=False)
+    assert done.returncode == 4
+    assert "did not converge: friction: the limit of iterations was reached" in done.stderr
+    assert ("% of the normal force is on slopes above 1/coefficient" in done.stderr) == wedges

@@ -19,7 +19,7 @@ module asperity_simulation
    use case_settings, only : case_type, road_moves
    use contact_model, only : commit_step, contact_type, new_contact, place_road, solve_normal
    use coupled_passes, only : coupled_passes_type, new_coupled_passes
-   use coupling_advice, only : advice_on_passes
+   use coupling_advice, only : advice_on_passes, advice_on_slopes
    use field_sums, only : field_mean
    use history_table, only : row_values
    use normal_state, only : reason_undetermined
@@ -311,11 +311,14 @@ contains
       type(simulation_type), intent(inout) :: self
       type(planned_row_type), intent(in) :: plan
       type(found_step_type), intent(in) :: found
+      character(:), allocatable :: advice
 
       self%converged = found%normal%converged .and. found%tangential%converged
       if (found%normal%converged .and. .not. found%tangential%converged) then
          call note_outcome(self, found%tangential)
          self%reason = 'friction: '//trim(found%tangential%reason)
+         advice = advice_on_slopes(self)
+         if (len(advice) > 0) self%reason = trim(self%reason)//'. '//advice
          if (self%tangential%road_pull%slides_off) then
             self%reason = pull_outcome(plan, self%tangential)
             self%residual = found%tangential%load_error
