@@ -906,7 +906,7 @@ contains
    end subroutine expected_slip_is_a_good_start
 
    !> Rough contacts on square and oblong cells, flat and sloping, periodic and free, in two dimensions and in one: the
-   !> tractions are the same whether a solve from rest starts on a coarser grid or not. In the third one some slopes are
+   !> tractions are the same whether a solve from rest starts on a coarser grid or not. In the third one a few slopes are
    !> too steep for zero tractions. The last one begins on the grid in any case, because its coarser grid would be the grid
    !> itself.
    subroutine a_start_on_a_coarser_grid_changes_nothing()

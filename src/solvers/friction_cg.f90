@@ -26,10 +26,11 @@
 !> against v. It is relative to the largest of several scales: the rms of DX in the contact, that of A T, the offset
 !> of a spring that pulls the road, and `least_scale`.
 !>
-!> A solve by 'fast' that starts without any traction begins on a coarser grid if there are many cells in contact (module
-!> `friction_start`). Otherwise its first iterations, half of them or more, would only find out which cells slip. Where the
-!> road is pulled, with adhesion, where cells touch in parts, and where half of the cells or more are expected to slip far
-!> (and therefore start along that slip), it begins on the grid itself.
+!> A solve by 'fast' that starts with hardly any traction begins on a coarser grid if there are many cells in contact
+!> (module `friction_start`). Otherwise its first iterations, half of them or more, would only find out which cells slip.
+!> Where the road is pulled, with adhesion, where cells touch in parts, and where more than a tenth of the cells start with a
+!> traction, it begins on the grid itself: a traction that is given, that of a far slip which is expected, or the least one
+!> that a slope steeper than mu allows. Such starts are better than a solution on a coarser grid.
 !>
 !> Memory in addition to the caller's fields, in fields of doubles: two for the spectrum of the operator (four on a free
 !> grid), two for that of the preconditioner, 3/4 for the symbols of the latter, and about one for the prediction of the
@@ -73,6 +74,7 @@ module friction_cg
    !> a residual near the round-off). Otherwise it would often end just below the tolerance, with an error of the
    !> friction above it.
    real(dp), parameter :: aim = 0.3_dp, resolved = 1.0e-10_dp
+   real(dp), parameter :: few = 0.1_dp           !! part of the cells in contact that may start with a traction
    integer, parameter :: many_cells = 2000       !! in contact, for which a start from a coarser grid pays
    real(dp), parameter :: least_ratio = 2.0_dp   !! cells of the grid to one of the coarser grid
    real(dp), parameter :: rough_tolerance = 1.0e-2_dp   !! of the solution on the coarser grid
@@ -194,7 +196,7 @@ contains
       class(friction_solver_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
 
-      yes = problem%from_rest .and. problem%bounds > 0.0_dp .and. problem%cells >= self%coarse_start_from &
+      yes = problem%loaded <= few*problem%cells .and. problem%bounds > 0.0_dp .and. problem%cells >= self%coarse_start_from &
          .and. .not. any(self%pull%along) .and. .not. associated(problem%fields%share) &
          .and. problem%law%adhesive_pressure <= 0.0_dp
    end function pays_to_start_coarser

@@ -64,11 +64,10 @@ module friction_problem
       type(friction_work_type), pointer :: work => null()
       type(row_constants_type) :: constants
       logical :: fresh = .false.             !! r comes from DX - A T, not from a recurrence
-      logical :: from_rest = .false.         !! the T given is zero everywhere, and few cells are expected to slip far
-      logical :: at_rest = .false.           !! the first T is zero everywhere
       real(dp) :: bounds = 0.0_dp            !! sum of the bounds, Pa
       integer :: cells = 0                   !! in contact
       integer :: foreseen = 0                !! cells in contact that started along the slip that was expected
+      integer :: loaded = 0                  !! cells in contact whose first T was not zero
       integer :: slipping = 0                !! on the bound
       integer :: released = 0                !! points that left the bound since the last move
       type(measure_sums_type) :: sums        !! of the last measure
@@ -99,28 +98,27 @@ contains
    subroutine place_start(self, operator)
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
-      real(dp), allocatable :: given(:), sizes(:), bounds(:)
-      integer, allocatable :: cells(:), foreseen(:)
+      real(dp), allocatable :: bounds(:)
+      integer, allocatable :: cells(:), foreseen(:), loaded(:)
       integer :: j
 
-      allocate (given(self%rows), sizes(self%rows), bounds(self%rows), cells(self%rows), foreseen(self%rows))
+      allocate (bounds(self%rows), cells(self%rows), foreseen(self%rows), loaded(self%rows))
       self%constants = row_constants_type(coefficient=self%law%reach_coefficient(), &
          strength=self%law%strength_beside(), physical=self%law%slope_effect .and. self%law%physical_slip, &
          compliance=self%compliance, stiffest=stiffest, on_bound=on_bound, deepest_inside=deepest_inside)
       call find_contact(self)
-      !$omp parallel do default(none) shared(self, operator, given, sizes, bounds, cells, foreseen) private(j) &
+      !$omp parallel do default(none) shared(self, operator, bounds, cells, foreseen, loaded) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
          call gather_row(self, j)
          bounds(j) = sum(self%work%site(:, 4, j))
-         call start_row(self, j, cells(j), foreseen(j), given(j), sizes(j))
+         call start_row(self, j, cells(j), foreseen(j), loaded(j))
          call self%transform_row(operator, j)
       end do
       self%cells = row_total(cells)
       self%foreseen = row_total(foreseen)
+      self%loaded = row_total(loaded)
       self%bounds = row_total(bounds)
-      self%from_rest = 2*self%foreseen < self%cells .and. .not. row_total(given) > 0.0_dp
-      self%at_rest = .not. row_total(sizes) > 0.0_dp
       self%change = 0.0_dp
    end subroutine place_start
 
@@ -129,7 +127,7 @@ contains
       class(friction_problem_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
 
-      if (self%at_rest .and. .not. associated(self%fields%past)) then
+      if (self%loaded == 0 .and. .not. associated(self%fields%past)) then
          call start_from_rest(self)
       else
          call self%update_slip(operator)
@@ -194,32 +192,29 @@ contains
    end subroutine gather_row
 
    !> Project the first T of a row.
-   subroutine start_row(self, j, cells, foreseen, given, size)
+   subroutine start_row(self, j, cells, foreseen, loaded)
       type(friction_problem_type), intent(inout) :: self
       integer, intent(in) :: j
       integer, intent(out) :: cells                !! in contact
       integer, intent(out) :: foreseen             !! cells in contact that start along the slip that is expected
-      real(dp), intent(out) :: given               !! |T|^2 of the T given, Pa^2
-      real(dp), intent(out) :: size                !! |T|^2 of the first T, Pa^2
+      integer, intent(out) :: loaded               !! cells in contact whose first T is not zero
       real(dp) :: limit, s, t(2)
       integer :: i
 
       cells = 0
       foreseen = 0
-      given = 0.0_dp
-      size = 0.0_dp
+      loaded = 0
       do i = 1, self%width
          t = 0.0_dp
          if (self%work%contact(i, j) /= contact_open) then
             t = self%work%traction(i, :, j)
-            given = given + (t(1)**2 + t(2)**2)
             ! Slipping points are returned to their bound from both sides, others only from outside.
             limit = merge(deepest_inside, 1.0_dp, self%work%contact(i, j) == contact_slip)
             if (self%fields%slip_unit > 0.0_dp) call start_along_slip(self, i, j, t, limit, foreseen)
             call self%place_on_bound(i, j, limit, t, s)
             self%work%contact(i, j) = merge(contact_slip, contact_stick, s < limit .or. s <= on_bound)
             cells = cells + 1
-            size = size + (t(1)**2 + t(2)**2)
+            if (any(abs(t) > 0.0_dp)) loaded = loaded + 1
          end if
          self%work%traction(i, :, j) = t
          self%work%old(i, :, j) = t
