@@ -42,9 +42,11 @@ module friction_cg_fast
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
    use friction_cg_gradient, only : friction_gradient_type
+   use field_sums, only : row_total
    use friction_fields, only : fit_field
    use friction_directions, only : direction_row, direction_sums_type, total_of
    use friction_form, only : friction_form_type, new_friction_form
+   use friction_law, only : contact_open
    use friction_method, only : friction_goal_type, friction_method_type
    use friction_moves, only : move, move_total
    use friction_preconditioner, only : friction_preconditioner_type, new_friction_preconditioner
@@ -65,6 +67,10 @@ module friction_cg_fast
    !> near its solution may overshoot more, because shortening costs more there than it gains.
    real(dp), parameter :: overshoot = 0.5_dp, overshoot_near = 2.0_dp
    integer, parameter :: near_steps = 15    !! number of these first iterations
+   !> d.A d over a_0 |d|^2 up to which a direction strains nothing.
+   real(dp), parameter :: strainless = 1.0e-10_dp
+   real(dp), parameter :: few = 0.05_dp     !! part of the points that may leave their bounds in a step along it
+   integer, parameter :: halvings = 60      !! largest number of halvings of such a step
    integer, parameter :: gradient_steps = 100    !! largest number of iterations of the fallback at a time
 
    !> The method with its preconditioner and work fields.
@@ -193,9 +199,51 @@ contains
          call self%form%predict(now%square, now%form)
       else
          call operator%columns(columns_apply, now%form)
+         if (now%form <= strainless*problem%compliance*now%square) &
+            now%form = now%slope/length_to_bounds(problem, self%d, now%square)
       end if
       call problem%spring%add_form(self%d, now%form)
    end subroutine find_direction
+
+   !> The length of a step along a direction that strains nothing, such as a uniform traction in full contact of a periodic
+   !> half-space: only the bounds limit it. The first length would bring d to the mean bound. It is halved until few points
+   !> leave their bounds.
+   function length_to_bounds(problem, d, square) result(length)
+      type(friction_problem_type), intent(in) :: problem
+      real(dp), contiguous, intent(in) :: d(:, :, :)     !! [width, 2, rows], Pa
+      real(dp), intent(in) :: square                     !! |d|^2, Pa^2
+      real(dp) :: length
+      integer :: trial
+
+      length = problem%bounds/sqrt(square*problem%cells)
+      do trial = 1, halvings
+         if (points_outside(problem, length, d) <= few*problem%cells) exit
+         length = 0.5_dp*length
+      end do
+   end function length_to_bounds
+
+   !> Count the points for which T + length d is outside its bound.
+   function points_outside(problem, length, d) result(points)
+      type(friction_problem_type), intent(in) :: problem
+      real(dp), intent(in) :: length
+      real(dp), contiguous, intent(in) :: d(:, :, :)     !! [width, 2, rows], Pa
+      integer :: points
+      integer :: counts(problem%rows), i, j
+      real(dp) :: t(2), s
+
+      counts = 0
+      !$omp parallel do default(none) shared(problem, length, d, counts) private(i, j, t, s) &
+      !$omp num_threads(problem%threads)
+      do j = 1, problem%rows
+         do i = 1, problem%width
+            if (problem%work%contact(i, j) == contact_open) cycle
+            t = problem%work%traction(i, :, j) + length*d(i, :, j)
+            call problem%place_on_bound(i, j, 0.0_dp, t, s)
+            if (s < 1.0_dp) counts(j) = counts(j) + 1
+         end do
+      end do
+      points = row_total(counts)
+   end function points_outside
 
    !> Compute T' = T + alpha d, returned to the bounds, and its slip. If this has overshot, take a shorter step.
    subroutine take_step(self, problem, operator, now)
