@@ -55,6 +55,7 @@ contains
       if (selected('adhesion_widens_the_bound')) call adhesion_widens_the_bound()
       if (selected('line_contacts_along_x_and_y_agree')) call line_contacts_along_x_and_y_agree()
       if (selected('uniform_contact_moves_by_mean_mode')) call uniform_contact_moves_by_mean_mode()
+      if (selected('full_contact_without_mean_compliance')) call full_contact_without_mean_compliance()
       if (selected('own_solution_is_kept')) call own_solution_is_kept()
       if (selected('expected_slip_is_a_good_start')) call expected_slip_is_a_good_start()
       if (selected('a_start_on_a_coarser_grid_changes_nothing')) call a_start_on_a_coarser_grid_changes_nothing()
@@ -838,6 +839,33 @@ contains
       call check_close(self%tx(1, 1), 0.5_dp, 1e-12_dp, 'one cell: slips')
       call end_case(self)
    end subroutine uniform_contact_moves_by_mean_mode
+
+   !> Full contact of a periodic half-space: a uniform traction strains nothing, so that it grows in the smallest motion until
+   !> some cells slip.
+   subroutine full_contact_without_mean_compliance()
+      integer, parameter :: cells(2, 4) = reshape([40, 40, 45, 32, 64, 64, 48, 1], [2, 4])
+      type(case_type) :: self
+      integer :: i, j, k, motion
+
+      do k = 1, size(cells, 2)
+         do motion = -7, -3
+            call new_case(self, cells(1, k), cells(2, k), 1.0_dp, 0.8_dp, boundary_periodic, 0.4_dp, 0.0_dp)
+            do j = 1, self%grid%ny
+               do i = 1, self%grid%nx
+                  self%p(i, j) = 0.05_dp + 0.025_dp*cos(4*pi*i/self%grid%nx)*cos(4*pi*j/self%grid%ny)
+               end do
+            end do
+            self%law = new_friction_law('coulomb', 0.5_dp, 0.0_dp, 0.0_dp, .false., .true.)
+            self%drive_x = 10.0_dp**motion
+            self%drive_y = 0.3_dp*self%drive_x
+            self%solver%tolerance = 1e-6_dp
+            call run_case(self, 'full contact', 1e-5_dp)
+            call check_that(count(self%contact == contact_slip) > 0, 'cells slip')
+            call check_that(self%result%iterations <= 100, 'number of iterations', [real(self%result%iterations, dp)])
+            call end_case(self)
+         end do
+      end do
+   end subroutine full_contact_without_mean_compliance
 
    !> The solver returns at once if it starts from the solution. Tractions from a higher pressure are reduced
    !> to the bound.

@@ -340,3 +340,16 @@ def test_a_flat_punch_on_a_long_strip_is_accurate():
             part = corner[1, 1] - corner[1, 0] - corner[0, 1] + corner[0, 0]
             moved[i] += found.pressure[j, 0] * part / (np.pi * modulus)
     assert np.ptp(moved) < 1e-3 * moved.mean()
+
+
+@pytest.mark.parametrize(("nx", "ny"), [(64, 64), (44, 31), (96, 1)])
+@pytest.mark.parametrize("pressure", [1e-9, 1e-2, 10.0])
+def test_uniform_start_of_given_approach(nx, ny, pressure):
+    """On a periodic grid the first step takes the same pressure from all cells."""
+    x, y = np.meshgrid(np.arange(nx) / nx, np.arange(ny) / ny)
+    height = 1e-2 * (np.cos(2 * np.pi * x) + np.cos(2 * np.pi * y))
+    reference = asperity.solve_normal(height, 1.0, 1.0, 1.0, displacement=5e-3)
+    done = asperity.solve_normal(height, 1.0, 1.0, 1.0, displacement=5e-3,
+                                 start=np.full((ny, nx), pressure))
+    difference = np.abs(done.pressure - reference.pressure).max()
+    assert difference < 1e-4 * reference.pressure.max()

@@ -71,6 +71,7 @@ module normal_iteration
    type :: iteration_type
       integer :: phase = phase_restart
       logical :: releases = .false.         !! the cells with a negative trial pressure are released
+      logical :: free_mean = .false.        !! the load is not given, and a uniform pressure strains nothing
       integer :: class = 0                  !! place in the lists of steps
       real(dp) :: kappa = 1.0_dp            !! by which trials are shorter than the model says
       real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
@@ -123,10 +124,11 @@ contains
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
-      if (fixed_load .or. work%grid%boundary /= boundary_periodic) then
-         call work%preconditioner%blocks%stiffen_mean()
-      else
+      now%free_mean = .not. fixed_load .and. work%grid%boundary == boundary_periodic
+      if (now%free_mean) then
          call work%preconditioner%blocks%stiffen_mean(1.0_dp - measure%contact)
+      else
+         call work%preconditioner%blocks%stiffen_mean()
       end if
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap, before)
@@ -269,7 +271,12 @@ contains
 
       call product%columns(columns_apply, form)
       form = form/modulus
-      if (form <= 0.0_dp) then
+      if (form <= 0.0_dp .and. now%free_mean .and. clipped) then
+         ! The step takes the same pressure from all cells, and leaves none: only the clip limits it.
+         now%alpha = 1.0_dp
+         now%phase = phase_restart
+         return
+      else if (form <= 0.0_dp) then
          call end_loop(now, 'no direction of descent is left')
          return
       end if
