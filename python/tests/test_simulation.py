@@ -1,6 +1,8 @@
 """Simulations driven by Python: the program's numbers, steering, saved states, callbacks."""
 
+import copy
 import gc
+import pickle
 
 import h5py
 import numpy as np
@@ -338,12 +340,32 @@ def test_faults_of_the_input_are_those_of_a_run(tmp_path):
         asperity.Simulation(tmp_path / "nowhere.nml")
 
 
-def test_a_solver_that_fails_leaves_its_state():
+def test_a_solver_that_fails_leaves_its_state(tmp_path):
     sim = asperity.Simulation(BASE.replace("threads", "max_iterations = 2, threads")
                               + "&phase pressure = 1e5 /\n")
     with pytest.raises(asperity.NotConverged, match="step 0 of phase 1") as caught:
         sim.advance()
     assert caught.value.result is sim and sim.row.step == 0
+    assert sim.finished
+    with pytest.raises(ValueError, match="has not converged"):
+        sim.save(tmp_path / "state.h5")
+    assert not (tmp_path / "state.h5").exists()
+    sent = pickle.loads(pickle.dumps(caught.value))
+    assert isinstance(sent, asperity.NotConverged)
+    assert str(sent) == str(caught.value) and sent.result is None
+
+
+@pytest.mark.parametrize("repeat", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_simulation_is_not_copied(repeat):
+    sim = asperity.Simulation(BASE + "&phase pressure = 1e5 /\n")
+    with pytest.raises(TypeError, match=r"Simulation\.resume"):
+        repeat(sim)
+
+
+def test_a_callback_may_return_a_truth_value_of_numpy(tmp_path):
+    run = asperity.run(BASE + FRICTION + SLIDE, output=tmp_path / "run.h5",
+                       callback=lambda row, sim: sim.fields["pressure"].max() < 0)
+    assert not run.finished and run.history.rows == 1
 
 
 def test_a_callback_sees_each_row_and_may_end_the_run(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 __all__ = ["NotConverged", "raise_for_status"]
@@ -19,6 +20,14 @@ class NotConverged(RuntimeError):  # noqa: N818 - an outcome that callers look f
     def __init__(self, message: str, result: Any = None) -> None:
         super().__init__(message)
         self.result = result
+
+    def __reduce__(self) -> tuple[type[NotConverged], tuple[str, Any]]:
+        """Pickle without a result that another process cannot have, such as a simulation."""
+        try:
+            pickle.dumps(self.result)
+        except TypeError:
+            return type(self), (str(self), None)
+        return type(self), (str(self), self.result)
 
 
 def raise_for_status(status: int, message: bytes | str) -> None:

@@ -85,8 +85,9 @@ def run(
     callback : callable, optional
         Function ``callback(row, sim)`` that is called after each row. The columns of `row` are
         attributes, and `sim` is a view of the run with ``row``, ``rows`` and ``fields``. If the
-        function returns False or raises an exception, the run ends with a checkpoint, from which
-        ``restart=True`` continues. To change the load between rows use `asperity.Simulation`.
+        function returns False (of Python or NumPy) or raises an exception, the run ends with a
+        checkpoint, from which ``restart=True`` continues. To change the load between rows use
+        `asperity.Simulation`.
 
     Returns
     -------
@@ -169,7 +170,8 @@ def _do_rows(handle: int, span: tuple[int, int], notes: bytes, result: bytes, st
                 break
             if callback is not None:
                 view = view or RunView(handle, rows, _shape(result))
-                if callback(view.row, view) is False:
+                answer = callback(view.row, view)
+                if isinstance(answer, bool | np.bool_) and not answer:
                     break
             if progress is not None:
                 progress.show(step, time, area, friction)

@@ -9,7 +9,7 @@ import warnings
 import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol, SupportsIndex
 
 import h5py
 import numpy as np
@@ -181,7 +181,7 @@ class Simulation:
         self._steered: dict[str, Any] = {}
         self.rows, self.shape, self.finished = int(rows), (int(ny), int(nx)), False
         self._lengths = float(lx), float(ly)
-        self._started = False
+        self._started = self._failed = False
         warn_of(notes)
 
     @property
@@ -207,7 +207,8 @@ class Simulation:
             If the simulation is finished or closed.
         NotConverged
             If a solver does not converge. Its ``result`` is this simulation in the state that was
-            reached.
+            reached. The simulation is finished then: its row and fields can be read, but it can
+            neither be continued nor saved.
         KeyboardInterrupt
             If Ctrl-C interrupts the row. The simulation is then where it was before the row, or
             after it if the row was just complete: `row` is the last complete one.
@@ -217,7 +218,7 @@ class Simulation:
         try:
             finished, notes = _step(self._handle)
         except NotConverged as error:
-            self._started = self.finished = True
+            self._started = self._failed = self.finished = True
             raise NotConverged(str(error), self) from None
         except KeyboardInterrupt:
             self._started, self.finished = map(bool, _progress(self._handle))
@@ -338,12 +339,16 @@ class Simulation:
         Raises
         ------
         ValueError
-            If no row has been computed yet, or the file exists and is no saved state.
+            If no row has been computed yet, the last row has not converged, or the file exists and
+            is no saved state.
         OSError
             If the file cannot be written.
         """
         if not self._started:
             raise ValueError("there is no state to save before the first row: call advance()")
+        if self._failed:
+            raise ValueError("the last row has not converged, and its state cannot be continued: "
+                             "save a simulation before the row that fails")
         path = Path(path)
         check_output(path, STATE)
         with tempfile.TemporaryDirectory(prefix="asperity-") as folder:
@@ -420,6 +425,11 @@ class Simulation:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
+        """Refuse to copy or pickle: the state is in the library, and both would advance it."""
+        raise TypeError("a simulation cannot be copied or pickled: write it with save(path), and "
+                        "continue as often as you like with asperity.Simulation.resume(path)")
 
     def __repr__(self) -> str:
         where = "before its first row"
