@@ -1,7 +1,7 @@
 !> The program `asperity`: it reads the command line, carries out the command, and ends with an exit
 !> status. No other place ends the program.
 program main
-   use case_files, only : default_result, overwritten_file
+   use case_files, only : default_result, refuse_overwriting
    use case_input, only : read_case
    use case_run, only : run_type
    use case_report, only : case_summary, resolved_input
@@ -113,7 +113,8 @@ contains
 
       call read_case(command%path, case, error)
       if (.not. allocated(error) .and. is_first_process()) then
-         call check_files(case%grid, case%surfaces, error)
+         call refuse_overwriting(case, error)
+         if (.not. allocated(error)) call check_files(case%grid, case%surfaces, error)
          if (.not. allocated(error)) call say(resolved_input(case)//case_summary(case), error)
       end if
       call agree(error)
@@ -164,8 +165,6 @@ contains
          return
       end if
       case%output%file = command%output
-      if (overwritten_file(case) /= '') call fail(error, error_input, 'asperity: --output '// &
-         command%output//': would overwrite '//overwritten_file(case))
    end subroutine choose_output
 
    !> Do the steps of a run. A signal or the time limit stops it after the present step, with a

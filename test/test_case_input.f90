@@ -373,9 +373,6 @@ contains
       call refuse(body//'&solver tolerance = 1.0 /', 'tolerance = 1.0: must be a number above 0 and below 1')
       call refuse(body//'&output compression = 10 /', 'must be an integer of at least 0 and at most 9')
       call refuse(body//'&output file = '''' /', 'must name a file')
-      call refuse(body//'&output file = ''road.nml'' /', 'would overwrite the input')
-      call refuse(body//'&surface shape = ''file'', file = ''a.h5'' /&output file = ''a.h5'' /', &
-         'would overwrite the height map')
       call refuse(body//'&case title = '''//repeat('x', 300)//''' /', 'must have at most 256 characters')
       call refuse(body//'&output file = '''//repeat('x', 3000)//''' /', 'of at most 1024 characters')
       call refuse(body//'&output snapshot_fields = ''slip_x'' /', 'need &friction')

@@ -13,7 +13,6 @@ module flat_runs
    use asperity_signals, only : catch_stops, give_back_stops, stop_was_asked
    use asperity_simulation, only : simulation_type
    use contact_fields, only : contact_rows, field_rows
-   use case_files, only : overwritten_file
    use case_run, only : run_type
    use case_settings, only : case_type
    use flat_answers, only : case_of, put_text, report, take_warnings
@@ -57,14 +56,7 @@ contains
 
       call case_of(path, text, case, error)
       if (.not. allocated(error)) then
-         if (output /= '') then
-            case%output%file = output
-            if (overwritten_file(case) /= '') call fail(error, error_input, 'output = '//output// &
-               ': would overwrite '//overwritten_file(case))
-         end if
-      end if
-
-      if (.not. allocated(error)) then
+         if (output /= '') case%output%file = output
          if (threads > 0) case%solver%threads = threads
          result_path = case%output%file
          warnings = case%warnings

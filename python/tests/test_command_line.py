@@ -11,6 +11,8 @@ from conftest import PATIENCE
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import asperity
+
 GOOD = """&grid nx = 16, ny = 8, lx = 1e-3 /
 &surface shape = 'sphere', radius = 0.01 /
 &material shear_modulus = 1e6 /
@@ -252,6 +254,26 @@ def test_a_result_never_replaces_what_it_comes_from(program, tmp_path):
     path.write_text(GOOD + "&output file = './link.nml' /\n")
     assert "overwrite the input" in call(program, "run", path).err
     assert path.read_text().startswith(GOOD)
+    done = call(program, "run", path, "--output", "other.h5", cwd=tmp_path)
+    assert done.returncode == 0, "another name is sufficient"
+
+
+def test_a_height_map_that_is_named_like_the_input(program, tmp_path):
+    asperity.surface.save(tmp_path / "road.h5", 1e-6 * np.cos(np.arange(16)) * np.ones((16, 1)),
+                          1e-3, 1e-3)
+    before = (tmp_path / "road.h5").read_bytes()
+    (tmp_path / "road.nml").write_text(
+        "&grid nx = 16, ny = 16, lx = 1e-3 /\n&surface shape = 'file', file = 'road.h5' /\n"
+        "&material shear_modulus = 1e6 /\n&phase pressure = 1e3 /\n")
+    for verb in ("check", "run"):
+        done = call(program, verb, "road.nml", cwd=tmp_path)
+        assert done.returncode == 2
+        assert "road.h5, which is named after the input, would overwrite the height map" in done.err
+    done = call(program, "run", "road.nml", "--output", "result.h5", cwd=tmp_path)
+    assert done.returncode == 0, done.err
+    assert (tmp_path / "result.h5").exists()
+    assert not asperity.Simulation(tmp_path / "road.nml").finished, "it writes no result"
+    assert (tmp_path / "road.h5").read_bytes() == before
 
 
 def test_check_reads_height_maps(program, tmp_path):

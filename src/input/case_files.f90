@@ -1,14 +1,29 @@
 !> The files of a case: the default name of its result, and the files that the result would overwrite.
 module case_files
+   use asperity_errors, only : error_input, error_type, fail
    use case_settings, only : case_type
    use path_identity, only : same_file
    use result_names, only : side_file, side_files
    implicit none
    private
 
-   public :: default_result, overwritten_file
+   public :: default_result, refuse_overwriting
 
 contains
+
+   !> Refuse a result that would overwrite a file of the case.
+   subroutine refuse_overwriting(case, error)
+      type(case_type), intent(in) :: case
+      type(error_type), allocatable, intent(out) :: error
+      character(:), allocatable :: what, name
+
+      what = overwritten_file(case)
+      if (what == '') return
+      name = trim(case%output%file)
+      if (name == default_result(case%path)) name = name//', which is named after the input,'
+      call fail(error, error_input, case%path//': the result '//name//' would overwrite '//what// &
+         ': give it another name with &output: file or --output')
+   end subroutine refuse_overwriting
 
    !> The file that the result, or a file beside it, would overwrite: the input, a height map, or '' for
    !> neither.

@@ -2,7 +2,7 @@
 module case_input
    use adhesion_advice, only : adhesion_warning, pull_off_warning
    use case_friction, only : resolve_friction, unused_variable
-   use case_files, only : default_result, overwritten_file
+   use case_files, only : default_result
    use case_material, only : resolve_material
    use case_phases, only : resolve_phases
    use case_settings, only : case_type, output_settings_type, path_length, word_length
@@ -326,8 +326,6 @@ contains
       call resolve_path(group, case%path, output%file, faults)
       if (.not. group%given('file')) output%file = default_result(case%path)
       case%output%file = output%file
-      if (overwritten_file(case) /= '' .and. .not. group%bad('file')) call group%fault('file', &
-         'would overwrite '//overwritten_file(case)//': give the result another file', faults)
       output%snapshot_every = group%integer_value('snapshot_every')
       output%snapshot_times = group%reals_value('snapshot_times')
       output%checkpoint_every = group%integer_value('checkpoint_every')

@@ -7,11 +7,12 @@
 !> the first process opens them, and a fault on one process ends all of them with the same message.
 module case_run
    use asperity_errors, only : error_convergence, error_type, fail
-   use asperity_parallel, only : global_max, processes_of_machine, share
+   use asperity_parallel, only : global_max, is_first_process, processes_of_machine, share
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
    use asperity_simulation, only : new_simulation, simulation_type
    use asperity_threads, only : set_threads
+   use case_files, only : refuse_overwriting
    use case_memory, only : memory_needed
    use case_settings, only : case_type
    use memory_limits, only : need_memory
@@ -61,6 +62,9 @@ contains
       self%next_time = 1
       self%last_snapshot = -1
       self%saved_at = seconds_now()
+      if (is_first_process()) call refuse_overwriting(case, error)
+      call agree(error)
+      if (allocated(error)) return
       call self%files%lock_place(trim(case%output%file), restart, overwrite, error)
       call check_memory(case, error)
       if (.not. allocated(error)) call new_simulation(self%sim, case, error)
