@@ -142,8 +142,8 @@ contains
       call agree(error)
       if (allocated(error)) return
       if (command%threads > 0) case%solver%threads = command%threads
-      if (case%warnings /= '' .and. is_first_process()) call say_error(case%warnings)
       call catch_signals()
+      if (case%warnings /= '' .and. is_first_process()) call say_error(case%warnings)
       call run_steps(case, error)
    end subroutine run
 

@@ -259,3 +259,14 @@ def test_threads_and_checkpoints_leave_the_numbers(program: str, tmp_path: Path)
     threads = str(min(2, os.cpu_count() or 1))
     assert vc.run(program, other, "--threads", threads).returncode == 0
     vc.assert_same(other.with_suffix(".h5"), plain.with_suffix(".h5"))
+
+
+def test_nobody_reads_the_messages(program: str, case: Path) -> None:
+    """A run whose stderr is a pipe without a reader does its work, and its status says so."""
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([program, "run", case], stderr=write, check=False, timeout=PATIENCE)
+    os.close(write)
+    assert done.returncode == 0
+    assert asperity.open(case.with_suffix(".h5")).finished
+    assert not case.with_suffix(".lock").exists()

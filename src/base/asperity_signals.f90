@@ -2,8 +2,8 @@
 !>
 !> SIGINT, SIGTERM, SIGHUP (the terminal was closed) and SIGXCPU (the limit of the batch system is
 !> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 requests a
-!> checkpoint. SIGXFSZ (a file would exceed the size limit) is ignored, so that the write that caused it
-!> fails with an error.
+!> checkpoint. SIGXFSZ (a file would exceed the size limit) and SIGPIPE (nobody reads the messages any
+!> more, as after `2>&1 | head`) are ignored, so that the write that caused them fails with an error.
 module asperity_signals
    use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, &
       c_null_ptr, c_ptr
@@ -17,6 +17,7 @@ module asperity_signals
    integer(c_int), parameter :: signal_interrupt = 2      !! SIGINT
    integer(c_int), parameter :: signal_user_linux = 10    !! SIGUSR1 of Linux
    integer(c_int), parameter :: signal_user_other = 30    !! SIGUSR1 of macOS and the BSDs, where 10 is SIGBUS
+   integer(c_int), parameter :: signal_pipe = 13          !! SIGPIPE
    integer(c_int), parameter :: signal_terminate = 15     !! SIGTERM
    integer(c_int), parameter :: signal_time = 24          !! SIGXCPU
    integer(c_int), parameter :: signal_file_size = 25     !! SIGXFSZ
@@ -67,6 +68,7 @@ contains
       before = c_signal(merge(signal_user_linux, signal_user_other, on_linux()), c_funloc(note_checkpoint))
       ignore = transfer(ignored, ignore)
       before = c_signal(signal_file_size, ignore)
+      before = c_signal(signal_pipe, ignore)
    end subroutine catch_signals
 
    !> Is this Linux? The numbers of some signals depend on the system.

@@ -70,29 +70,30 @@ contains
    !> Show the last step and end the line, because the run is over or a message follows.
    subroutine finish(self)
       class(progress_type), intent(inout) :: self
+      integer :: unread
 
       if (self%quiet) return
       if (self%pending) call self%show(seconds_now())
-      if (self%terminal .and. self%shown_length > 0) write (error_unit, '(a)') ''
+      if (self%terminal .and. self%shown_length > 0) write (error_unit, '(a)', iostat=unread) ''
       self%shown_length = 0
    end subroutine finish
 
-   !> Show the last row.
+   !> Show the last row. A line that cannot be written, because nobody reads it any more, is lost.
    subroutine show(self, now)
       class(progress_type), intent(inout) :: self
       real(dp), intent(in) :: now           !! s
       character(:), allocatable :: line
-      integer :: length
+      integer :: length, unread
 
       line = progress_line(self%row, self%rows, self%first_step, now - self%started)
       length = len(line)
       if (self%terminal) then
          line = char(13)//line//repeat(' ', max(0, self%shown_length - length))
-         write (error_unit, '(a)', advance='no') line
+         write (error_unit, '(a)', advance='no', iostat=unread) line
       else
-         write (error_unit, '(a)') line
+         write (error_unit, '(a)', iostat=unread) line
       end if
-      flush (error_unit)
+      flush (error_unit, iostat=unread)
       self%shown_length = length
       self%shown = now
       self%pending = .false.
