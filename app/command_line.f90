@@ -274,7 +274,7 @@ contains
             '  --threads N       use N threads; the default is OMP_NUM_THREADS, SLURM_CPUS_PER_TASK,'//nl// &
             '                    or all processors'//nl// &
             '  --restart         continue from the last checkpoint of the result'//nl// &
-            '  --overwrite       replace an unfinished result and its checkpoint'//nl// &
+            '  --overwrite       replace the file of the result, and its checkpoint'//nl// &
             '  --time-limit T    stop with a checkpoint before T has passed: M, H:M:S or D-H:M:S;'//nl// &
             '                    the default is the end of the Slurm job, if there is one'//nl// &
             '  --quiet           show no progress'//nl//nl// &

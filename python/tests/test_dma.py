@@ -333,9 +333,9 @@ def test_arguments_of_the_call_override_the_header(tmp_path):
 
 
 WRONG = [
-    ("f (Hz),G' (Pa),G'' (Pa)\n1,2,3\n2,abc,4\n3,4\n4,5,-6\n5,6,nan\n",
+    ("f (Hz),G' (Pa),G'' (Pa)\n1,2,3\n2,abc,4\n3,4\n4,5,-6\n5,6,inf\n",
      [r"line 3: storage = 'abc': must be a number > 0", "line 4: has 2 columns, must have 3",
-      "line 5: loss = '-6': must be a number > 0", "line 6: loss = 'nan'"]),
+      "line 5: loss = '-6': must be a number > 0", "line 6: loss = 'inf'"]),
     ("f (Hz),G' (Pa),G'' (Pa),T (C)\n1,2,3,20\n2,3,4,hot\n3,4,5,20\n",
      [r"line 3: temperature = 'hot': must be a finite number"]),
     ("# remark\n\nf (Hz),G' (Pa)\n1,2\n", ["line 3: the columns 'f \\(Hz\\)', \"G' \\(Pa\\)\" have"

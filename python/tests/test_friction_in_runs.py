@@ -351,3 +351,19 @@ def test_short_slip_of_a_thick_block(tmp_path: Path) -> None:
     heat = 0.5 * history["force"][-1] * 1e-6
     assert loss[-1] - loss[slow[0] - 1] == pytest.approx(heat, rel=0.02)
     assert np.all(history["stick_area"][slow] == 0)
+
+
+@pytest.mark.parametrize("law", [
+    {"law": "coulomb", "coefficient": 0.5},
+    {"law": "coulomb_orowan", "coefficient": 0.5, "shear_strength": 3e4}])
+@pytest.mark.parametrize("boundary", ["periodic", "free"])
+def test_elastic_contact_sticks_when_the_road_has_stopped(law, boundary):
+    """What the first step at rest corrects of the step before is within its tolerance: no slip."""
+    case = asperity.Case(
+        grid={"nx": 42, "ny": 55, "lx": 1e-3, "ly": 1.3888e-3, "boundary": boundary},
+        surface={"shape": "sphere", "radius": 5e-3}, material={"shear_modulus": 1e6},
+        friction=law, phase=[{"pressure": 2e4}, {"duration": 1e-3, "steps": 3, "velocity_y": 0.2},
+                             {"duration": 1e-3, "steps": 3, "velocity_y": 0.0}])
+    rows = list(asperity.Simulation(case))
+    assert [row.stick_area for row in rows[1:4]] == [0, 0, 0]
+    assert [row.stick_area for row in rows[4:]] == [row.contact_area for row in rows[4:]]

@@ -368,7 +368,8 @@ contains
          call book_rest(state, self%law, self%adhesive, pressure, gap, slope_x, slope_y)
          return
       end if
-      call mark_idle(state, self%slip, idle_slip(self))
+      call mark_idle(state, self%slip, idle_slip(self, state%way))
+      state%way = norm2(self%motion)
       products = new_products(material)
       carried = 0.0_dp
       if (state%block%mass > 0.0_dp) then
@@ -396,15 +397,18 @@ contains
    end subroutine commit
 
    !> The longest slip of the step that may be an error, m. While the road rests, it is the error that every solve may
-   !> leave, because errors of earlier steps then appear as slip. This error is in proportion to the displacements. In a
-   !> thick block they contain the shear of the whole block, and the error may be longer than the way of the road in a
-   !> step. While the road moves, the error that the last solve has really left therefore counts.
-   pure function idle_slip(self) result(slip)
+   !> leave, because errors of earlier steps then appear as slip. This error is in proportion to the displacements, and in
+   !> the first step of a rest to the way of the road in the step before. In a thick block the displacements contain the
+   !> shear of the whole block, and the error may be longer than the way of the road in a step. While the road moves, the
+   !> error that the last solve has really left therefore counts.
+   pure function idle_slip(self, way_before) result(slip)
       class(tangential_step_type), intent(in) :: self
+      real(dp), intent(in) :: way_before              !! of the road in the step before, m
       real(dp) :: slip
 
       slip = self%solver%allowed_slip/self%q
       associate (way => norm2(self%motion), reached => self%solver%reached_slip/self%q)
+         if (.not. way > 0.0_dp) slip = max(slip, self%solver%accepted*way_before)
          if (way > reached) slip = min(slip, max(reached, self%solver%tolerance*way))
       end associate
    end function idle_slip

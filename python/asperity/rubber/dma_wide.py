@@ -22,7 +22,7 @@ _LINES_ABOVE = 3        # number of lines above the header that may contain the 
 
 #: Words that instruments write instead of a missing value.
 MISSING = {"", "-", "--", "---", "ovl", "ovld", "ovr", "over", "overload", "overflow", "n/a", "na",
-           "n.a.", "#n/a", "#nv", "invalid", "*", "**", "***"}
+           "n.a.", "#n/a", "#nv", "nan", "invalid", "*", "**", "***"}
 
 
 class _Group(NamedTuple):
