@@ -768,6 +768,20 @@ def test_a_dataset_surface_is_read_as_the_program_reads_it(tmp_path):
         load(tmp_path / "road.h5", unit="m", size=(46e-6, 21e-6), transpose=True)
 
 
+@pytest.mark.parametrize("name", ["surface", "surface/height"])
+@pytest.mark.parametrize("unit", ["um", "µm", b"um"])
+def test_a_dataset_may_name_its_unit(tmp_path, name, unit):
+    """The attribute `units` counts, which a run warns of."""
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file[name] = sample()
+        file[name].attrs["units"] = unit
+    found = load(tmp_path / "road.h5", level="none", size=(46, 21))
+    np.testing.assert_allclose(found.height, 1e-6 * sample(), rtol=1e-14)
+    assert (found.lx, found.ly) == pytest.approx((46e-6, 21e-6))
+    with pytest.raises(ValueError, match=r"unit = 'm': .* has its own unit, 'um'"):
+        load(tmp_path / "road.h5", unit="m", size=(46, 21))
+
+
 def test_one_of_several_datasets_has_to_be_named(tmp_path):
     """Datasets of other names have x first, as in SurfaceTopography."""
     with h5py.File(tmp_path / "map.h5", "w") as file:

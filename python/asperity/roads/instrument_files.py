@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.check import choice, positive
 from ..base.tables import text_of
-from .map_files import own_map, text_map, text_table
+from .map_files import own_map, text_map, text_table, unit_of_dataset
 from .text_repair import repaired_matrix, with_height
 
 __all__ = ["UNITS", "channels", "read_map", "to_metres"]
@@ -285,7 +285,7 @@ def read_map(
                 f"{path}: channel {chosen.channel_id!r} is a line scan with points at uneven"
                 " distances: a run needs a regular grid; interpolate it first, as with"
                 " SurfaceTopography's to_uniform")
-        used = _used_unit(path, chosen, given)
+        used = _used_unit(path, _unit_of(chosen.unit) or _dataset_unit(path, reader, chosen), given)
         # The program reads the dataset `surface` with the shape (ny, nx), so that it has no other
         # meaning here. SurfaceTopography reads all datasets with x first.
         rows_first = reader.format() == _HDF5 and chosen.name == _SURFACE
@@ -305,7 +305,7 @@ def read_map(
             named = _unit_of(chosen.unit) or ""
             raise ValueError(f"size: {path} has its own, {known} {named}".rstrip())
         if chosen.unit is None:
-            arguments["unit"] = given
+            arguments["unit"] = used
         try:
             heights, lengths, periodic, metadata = _heights(path, reader, chosen, arguments)
         except Exception as error:
@@ -330,9 +330,18 @@ def read_map(
     return array, lengths, periodic, used, source
 
 
-def _used_unit(path: Path, chosen: Any, given: str | None) -> str:
-    """Return the unit of a channel, or the given one if the file names none."""
-    named = _unit_of(chosen.unit)
+def _dataset_unit(path: Path, reader: Any, chosen: Any) -> str | None:
+    """Return the unit in the attribute `units` of an HDF5 dataset, if it is one of length."""
+    if reader.format() != _HDF5:
+        return None
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return unit_of_dataset(file[chosen.name])
+
+
+def _used_unit(path: Path, named: str | None, given: str | None) -> str:
+    """Return the unit that a file names, or the given one if it names none."""
     if named is not None and named not in UNITS:
         raise ValueError(f"{path}: has the unit {named!r}: must be one of {', '.join(UNITS)}")
     if named is not None and given is not None and named != given:

@@ -28,7 +28,8 @@ from ..base.tables import (
     text_of,
 )
 
-__all__ = ["PlainReader", "is_value", "own_map", "row_of_numbers", "text_map", "text_table"]
+__all__ = ["PlainReader", "is_value", "own_map", "row_of_numbers", "text_map", "text_table",
+           "unit_of_dataset"]
 
 FloatArray = NDArray[np.float64]
 
@@ -146,8 +147,10 @@ def own_map(path: Path) -> PlainReader | None:
             return None
         array = np.asarray(height[()], dtype=float).T
         if grid is None or not {"lx", "ly"} <= set(grid.attrs):
-            # A bare dataset, as `&surface file` takes it: heights in metres, lengths unknown.
-            return PlainReader("asperity", PlainMap(array, "surface/height", None, "m"))
+            # A bare dataset, as `&surface file` takes it: heights in metres, unless its attribute
+            # `units` says otherwise; lengths unknown.
+            unit = unit_of_dataset(height) or "m"
+            return PlainReader("asperity", PlainMap(array, "surface/height", None, unit))
         lx, ly = (float(np.ravel(grid.attrs[name])[0]) for name in ("lx", "ly"))
         boundary = np.ravel(grid.attrs.get("boundary", "free"))[0]
         boundary = boundary.decode() if isinstance(boundary, bytes) else str(boundary)
@@ -158,6 +161,14 @@ def own_map(path: Path) -> PlainReader | None:
         return PlainReader("asperity", PlainMap(array[:, 0], "surface/height", (lx,), "m",
                                                 periodic, info))
     return PlainReader("asperity", PlainMap(array, "surface/height", (lx, ly), "m", periodic, info))
+
+
+def unit_of_dataset(dataset: Any) -> str | None:
+    """Return the attribute `units` of a dataset of HDF5, or None if it is no unit of length."""
+    value = dataset.attrs.get("units", "")
+    text = value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+    unit = re.sub("[\u00b5\u03bc]", "u", text.strip())
+    return unit if unit in _METRES else None
 
 
 def text_map(path: Path, kind: str = "text") -> PlainReader:
