@@ -199,10 +199,10 @@ contains
          call self%form%predict(now%square, now%form)
       else
          call operator%columns(columns_apply, now%form)
-         if (now%form <= strainless*problem%compliance*now%square) &
-            now%form = now%slope/length_to_bounds(problem, self%d, now%square)
       end if
       call problem%spring%add_form(self%d, now%form)
+      if (problem%slipping == 0 .and. now%form <= strainless*problem%compliance*now%square) &
+         now%form = now%slope/length_to_bounds(problem, self%d, now%square)
    end subroutine find_direction
 
    !> The length of a step along a direction that strains nothing, such as a uniform traction in full contact of a periodic

@@ -95,16 +95,18 @@ contains
       if (.not. self%periodic) return
       mean = operator%symbols%mean_mode(1)*operator%grid%cells()
       self%has_mean = mean > 0.0_dp
-      if (self%has_mean) call self%inverse%symbols%set_mean_compliance(1.0_dp/mean)
+      if (.not. self%has_mean) mean = self%half_wave
+      call self%inverse%symbols%set_mean_compliance(1.0_dp/mean)
    end subroutine set_mean_stiffness
 
-   !> Set the mean mode of M for a solid that has none, from the number of cells that stick.
+   !> Set the mean mode of M for a solid that has none, from the number of cells that stick. Where springs hold a road that
+   !> is pulled, they have its mean mode.
    subroutine guess_mean_stiffness(self, problem)
       class(friction_preconditioner_type), intent(inout) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: cells, yielding
 
-      if (self%has_mean .or. .not. self%periodic) return
+      if (self%has_mean .or. .not. self%periodic .or. any(problem%spring%pulled)) return
       cells = self%inverse%grid%cells()
       yielding = max(1.0_dp, cells - (problem%cells - problem%slipping))/cells
       call self%inverse%symbols%set_mean_compliance(1.0_dp/(self%half_wave*yielding**2))
