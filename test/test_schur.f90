@@ -34,7 +34,7 @@ contains
       if (selected('preconditioner_is_the_schur_complement')) then
          call preconditioner_is_the_schur_complement(boundary_periodic, 24, 16, 1.0_dp)
          call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp)
-         call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp, open_part=0.55_dp)
+         call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp, mean_stiffness=4.0_dp)
          call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
       end if
       if (selected('a_given_approach_makes_only_the_mean_stiff')) call a_given_approach_makes_only_the_mean_stiff()
@@ -42,6 +42,8 @@ contains
          call released_cells_change_the_direction(boundary_periodic, 24, 16, 1.0_dp)
          call released_cells_change_the_direction(boundary_free, 19, 21, 1.5_dp)
       end if
+      if (selected('long_grids_take_few_iterations_at_a_given_approach')) &
+         call long_grids_take_few_iterations_at_a_given_approach()
       if (selected('iterations_stay_few_at_every_load')) call iterations_stay_few_at_every_load()
       if (selected('oblong_cells_take_few_iterations')) then
          call oblong_cells_take_few_iterations(96, 90, 8.0_dp, 24)
@@ -65,11 +67,11 @@ contains
    end subroutine run_schur
 
    !> Make a preconditioner, and its model B as a dense matrix.
-   subroutine new_setting(s, grid, b, open_part)
+   subroutine new_setting(s, grid, b, mean_stiffness)
       type(setting_type), intent(out), target :: s
       type(grid_type), intent(in) :: grid
       real(dp), allocatable, intent(out) :: b(:, :)
-      real(dp), intent(in), optional :: open_part    !! of the cells, at a given approach
+      real(dp), intent(in), optional :: mean_stiffness   !! at a given approach
       type(error_type), allocatable :: error
       real(dp) :: unit(grid%nx*grid%ny), form
       integer :: i
@@ -81,7 +83,7 @@ contains
       allocate (s%memory(grid%nx, grid%ny))
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
       call check_no_error(error, 'a preconditioner')
-      call s%preconditioner%blocks%stiffen_mean(open_part)
+      if (present(mean_stiffness)) call s%preconditioner%blocks%stiffen_mean(mean_stiffness)
       allocate (b(size(unit), size(unit)))
       do i = 1, size(unit)
          unit(:) = 0.0_dp
@@ -91,10 +93,10 @@ contains
    end subroutine new_setting
 
    !> M r is the Schur complement of the model, which is a dense matrix on a small grid.
-   subroutine preconditioner_is_the_schur_complement(boundary, nx, ny, aspect, open_part)
+   subroutine preconditioner_is_the_schur_complement(boundary, nx, ny, aspect, mean_stiffness)
       integer, intent(in) :: boundary, nx, ny
       real(dp), intent(in) :: aspect                 !! dy/dx
-      real(dp), intent(in), optional :: open_part    !! of the cells, at a given approach
+      real(dp), intent(in), optional :: mean_stiffness   !! at a given approach
       type(setting_type), target :: s
       real(dp), allocatable :: b(:, :), r(:), z(:), exact(:), found(:)
       logical, allocatable :: inside(:)
@@ -102,7 +104,7 @@ contains
       real(dp) :: form, before
       integer :: i, n, steps
 
-      call new_setting(s, new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary), b, open_part)
+      call new_setting(s, new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary), b, mean_stiffness)
       n = nx*ny
       allocate (z(n))
       call check_order(maxval(abs(b - transpose(b))), '<=', 1e-6_dp*maxval(abs(b)), &
@@ -140,7 +142,7 @@ contains
       call new_setting(s, grid, b)
       call s%preconditioner%destroy()
       call s%coarse%destroy()
-      call new_setting(s, grid, stiff, open_part=0.2_dp)
+      call new_setting(s, grid, stiff, mean_stiffness=10.0_dp)
       call check_close(maxval(abs(stiff - b - 10.0_dp/size(b, 1))), 0.0_dp, 1e-6_dp*maxval(abs(b)), 'a stiff mean')
       call s%preconditioner%destroy()
       call s%coarse%destroy()
@@ -368,6 +370,30 @@ contains
          call check_order(sum(abs(solution%pressure - pressure)), '<=', 1e-4_dp*sum(pressure), 'the same contact')
       end do
    end subroutine iterations_stay_few_at_every_load
+
+   !> A cone on a grid 24 and 96 times as long as wide touches along most of the width, so that the open cells are one large
+   !> area and the mean is soft.
+   subroutine long_grids_take_few_iterations_at_a_given_approach()
+      integer, parameter :: lengths(2) = [480, 1920]
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution
+      real(dp), allocatable :: h(:, :)
+      integer :: i, j, k
+
+      do k = 1, size(lengths)
+         grid = new_grid(lengths(k), 20, 1.0_dp, 20.0_dp/lengths(k), boundary_periodic)
+         h = reshape([((-hypot((i - 0.5_dp)/lengths(k) - 0.5_dp, (j - 10.5_dp)/lengths(k)), i=1, lengths(k)), j=1, 20)], &
+            [lengths(k), 20])
+         problem = normal_problem_type()
+         problem%control = control_approach
+         problem%target = 0.22_dp
+         problem%tolerance = 1e-6_dp
+         call run_problem(grid, problem, h, solution)
+         call check_that(solution%outcome%converged, solution%outcome%reason)
+         call check_order(solution%outcome%iterations, '<=', 14, 'few iterations on a long grid')
+      end do
+   end subroutine long_grids_take_few_iterations_at_a_given_approach
 
    !> On oblong cells the stencil is adapted, and the residual is extended where that is an advantage.
    subroutine oblong_cells_take_few_iterations(nx, ny, aspect, most)

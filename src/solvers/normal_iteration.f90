@@ -25,7 +25,7 @@
 module normal_iteration
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
-   use normal_passes, only : new_direction, normal_work_type, overlap_with, predict_form
+   use normal_passes, only : new_direction, normal_work_type, overlap_with, predict_form, mean_stiffness
    use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type
@@ -119,17 +119,15 @@ contains
       real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
       real(dp), contiguous, intent(inout) :: before(:, :)  !! work field, for the residual before
       type(iteration_type), intent(inout) :: now
-      real(dp) :: rz, beta
+      real(dp) :: rz, beta, stiffness
       integer :: steps
       logical :: fixed_load
 
       fixed_load = task%control == control_pressure
       now%free_mean = .not. fixed_load .and. work%grid%boundary == boundary_periodic
-      if (now%free_mean) then
-         call work%preconditioner%blocks%stiffen_mean(1.0_dp - measure%contact)
-      else
-         call work%preconditioner%blocks%stiffen_mean()
-      end if
+      stiffness = 0.0_dp
+      if (now%free_mean) stiffness = mean_stiffness(work, 1.0_dp - measure%contact, pressure)
+      call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
          pressure, gap, before)
       work%preconditioner%waves%fixed_load = fixed_load

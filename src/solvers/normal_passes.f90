@@ -12,13 +12,20 @@ module normal_passes
    use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
    use normal_sweeps, only : direction_cells, load_cells, overlap_cells, spread_cells
-   use asperity_precision, only : dp, sp
+   use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private
 
-   public :: new_direction, new_normal_work, normal_work_type, overlap_with, predict_form, survey, update_state
+   public :: new_direction, new_normal_work, normal_work_type, overlap_with, predict_form, mean_stiffness, survey, &
+      update_state
+
+   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
+   !> inverse compliance of an open cell that is surrounded by cells in contact.
+   real(dp), parameter :: of_open_cells = 2.0_dp
+   real(dp), parameter :: long = 4.0_dp        !! length over width of a long grid
+   real(dp), parameter :: stiffer = 5.0_dp     !! factor on the stiffness that the block means predict
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
    type :: normal_work_type
@@ -162,6 +169,64 @@ contains
       call self%coarse%share_blocks(self%coarse%mean)
       form = self%coarse%predict_form(row_total(squares))
    end function predict_form
+
+   !> The stiffness that the model has for the mean of v at a given approach on a periodic grid.
+   !>
+   !> The mean displacement is given then, so that B is infinite for the mean: v should have none. If the pressure of all
+   !> cells in contact changes by the same amount, only the gaps of the open cells N change. A finite stiffness of about the
+   !> inverse compliance of this change is therefore sufficient. With n cells it is
+   !>     n/(1_S.A 1_S),     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell)
+   !> where the second form holds for open cells that are far from each other. On a long grid large areas between the contacts
+   !> are open over the whole width, and the mean is much softer. The product then follows from the block means of the
+   !> contact. A stiffness that is much too large takes many more iterations there, because v is extended only to a rim
+   !> around the contact.
+   function mean_stiffness(self, open_part, pressure) result(stiffness)
+      type(normal_work_type), intent(inout) :: self
+      real(dp), intent(in) :: open_part                      !! of the cells
+      real(dp), contiguous, intent(in) :: pressure(:, :)     !! Pa
+      real(dp) :: stiffness                                  !! in the units of the model
+      real(dp) :: cells, form, touching
+
+      cells = self%grid%cells()
+      stiffness = of_open_cells/max(open_part, 1.0_dp/cells)
+      if (max(self%grid%lx, self%grid%ly) < long*min(self%grid%lx, self%grid%ly)) return
+      call take_contact(self, pressure, touching)
+      associate (coarse => self%coarse)
+         form = coarse%predict_form(touching)
+         if (form > 0.0_dp) stiffness = min(stiffness, stiffer*cells*pi*coarse%kernel%compliance(pi/coarse%h)/form)
+      end associate
+   end function mean_stiffness
+
+   !> Compute the block means of the contact, 1 where there is pressure, and the number of cells.
+   subroutine take_contact(self, pressure, touching)
+      type(normal_work_type), intent(inout) :: self
+      real(dp), contiguous, intent(in) :: pressure(:, :)     !! Pa
+      real(dp), intent(out) :: touching
+      real(dp), allocatable :: column(:)
+      integer :: counts(self%grid%rows()), j, k, jb
+
+      !$omp parallel default(none) shared(self, pressure, counts) private(j, k, jb, column) &
+      !$omp num_threads(self%threads)
+      allocate (column(self%grid%nx))
+      !$omp do schedule(dynamic)
+      do jb = self%coarse%strips(1), self%coarse%strips(2)
+         column(:) = 0.0_dp
+         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
+            counts(j) = 0
+            do k = 1, self%active%runs(j)
+               associate (a => self%active%first(k, j), b => self%active%last(k, j))
+                  column(a:b) = column(a:b) + merge(1.0_dp, 0.0_dp, pressure(a:b, j) > 0.0_dp)
+                  counts(j) = counts(j) + count(pressure(a:b, j) > 0.0_dp)
+               end associate
+            end do
+         end do
+         call self%coarse%sum_blocks(column, self%coarse%mean(:, jb))
+         self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
+      end do
+      !$omp end parallel
+      call self%coarse%share_blocks(self%coarse%mean)
+      touching = row_total(counts)
+   end subroutine take_contact
 
    !> Compute the direction in a row.
    subroutine direction_row(self, preconditioned, beta, j, pressure, correction, sums)

@@ -19,9 +19,6 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
-   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
-   !> inverse compliance of an open cell that is surrounded by cells in contact.
-   real(dp), parameter :: of_open_cells = 2.0_dp
 
    integer, parameter :: small = 16384         !! blocks below which one thread is faster
 
@@ -71,18 +68,12 @@ contains
       call new_schur_coarse(self%model, grid, c0, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
 
-   !> Make the mean of v stiff or, if there is no part of open cells, leave it as it is.
-   !>
-   !> At a given approach on a periodic grid the mean displacement is given, so that B is infinite for the mean: v should
-   !> have none. If the pressure of all cells in contact changes by the same amount, only the gaps of the open cells change,
-   !>     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell).
-   !> A finite stiffness of about the inverse of that, over the number of all cells, is therefore sufficient.
-   subroutine stiffen_mean(self, open_part)
+   !> Make the mean of v over the grid stiff; 0 leaves the model as it is. In the units of the model.
+   pure subroutine stiffen_mean(self, stiffness)
       class(schur_blocks_type), intent(inout) :: self
-      real(dp), intent(in), optional :: open_part        !! of the cells
+      real(dp), intent(in) :: stiffness
 
-      self%mean_stiffness = 0.0_dp
-      if (present(open_part)) self%mean_stiffness = of_open_cells/max(open_part, 1.0_dp/self%cells)
+      self%mean_stiffness = stiffness
    end subroutine stiffen_mean
 
    !> Compute the coarse part of B from the sums of a field over the blocks. Collective.

@@ -22,7 +22,7 @@
 !> proportional to the inverse squares, like those of a Laplacian, they would be far too large along the short side of
 !> oblong cells.
 !>
-!> At a given approach on a periodic grid the mean of v is stiff in the model (`stiffen_mean` of module `schur_blocks`).
+!> At a given approach on a periodic grid the mean of v is stiff in the model (`mean_stiffness` of module `normal_passes`).
 !>
 !> The same conjugate gradients continue from v after some cells were moved from S to N (module `schur_release`).
 !>
