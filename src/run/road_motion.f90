@@ -28,6 +28,7 @@ contains
       if (.not. self%slides) return
       drift = 0.0_dp
       if (self%rubs()) then
+         self%tangential%way_before = norm2(self%state%velocity)*self%state%tangential%last_dt
          ! The surface is expected to move as in the step before or, if the road has just started, with the road.
          drift = self%state%tangential%rate*plan%dt
          if (plan%new_speed .and. .not. any(abs(self%state%velocity) > 0.0_dp)) &

@@ -183,7 +183,6 @@ contains
       call table%add('tangential/block/speed', t%block%speed, 'm/s', 'speed of the mass over the road')
       call table%add('tangential/block/acceleration', t%block%acceleration, 'm/s2', 'acceleration of the mass')
       call table%add('tangential/rate', t%rate, 'm/s', 'mean speed of the surface in the contact')
-      call table%add('tangential/way', t%way, 'm', 'way of the road in the last step')
       call table%add('tangential/last_dt', t%last_dt, 's', 'length of the last step, 0 after a jump')
       call table%add('tangential/block/work', t%block%work, 'J', 'work done on the mass')
       call table%add('tangential/block/lost', t%block%lost, 'J', 'energy that the rule of its motion lost')

@@ -86,7 +86,6 @@ contains
       before = state%block%kinetic()
       state%moved = .true.
       state%last_dt = 0.0_dp
-      state%way = 0.0_dp
       state%rate = 0.0_dp
       state%block%speed = -velocity
       state%block%fresh = .true.

@@ -35,7 +35,6 @@ module tangential_state
       type(place_forecast_type) :: forecast           !! of U_T in the next step
       type(arm_state_type) :: arms
       type(energy_books_type) :: books                !! of the strain of the rubber
-      real(dp) :: way = 0.0_dp                        !! of the road in the last step, m
       real(dp) :: rate(2) = 0.0_dp                    !! mean speed of the surface in the contact, m/s
       real(dp) :: lost_friction = 0.0_dp              !! J
    contains

@@ -52,6 +52,7 @@ module tangential_step
       !> The share of its bound that each cell may carry [nx, rows]. If it is not allocated, cells in contact carry the
       !> whole bound.
       real(dp), allocatable :: share(:, :)
+      real(dp) :: way_before = 0.0_dp                 !! of the road in the step before, m
       logical :: starts = .false.                     !! the step follows a jump, or is the first one with friction
       type(convolution_type), private :: operator
       type(friction_solver_type), private :: solver
@@ -368,8 +369,7 @@ contains
          call book_rest(state, self%law, self%adhesive, pressure, gap, slope_x, slope_y)
          return
       end if
-      call mark_idle(state, self%slip, idle_slip(self, state%way))
-      state%way = norm2(self%motion)
+      call mark_idle(state, self%slip, idle_slip(self))
       products = new_products(material)
       carried = 0.0_dp
       if (state%block%mass > 0.0_dp) then
@@ -401,14 +401,13 @@ contains
    !> the first step of a rest to the way of the road in the step before. In a thick block the displacements contain the
    !> shear of the whole block, and the error may be longer than the way of the road in a step. While the road moves, the
    !> error that the last solve has really left therefore counts.
-   pure function idle_slip(self, way_before) result(slip)
+   pure function idle_slip(self) result(slip)
       class(tangential_step_type), intent(in) :: self
-      real(dp), intent(in) :: way_before              !! of the road in the step before, m
       real(dp) :: slip
 
       slip = self%solver%allowed_slip/self%q
       associate (way => norm2(self%motion), reached => self%solver%reached_slip/self%q)
-         if (.not. way > 0.0_dp) slip = max(slip, self%solver%accepted*way_before)
+         if (.not. way > 0.0_dp) slip = max(slip, self%solver%accepted*self%way_before)
          if (way > reached) slip = min(slip, max(reached, self%solver%tolerance*way))
       end associate
    end function idle_slip
