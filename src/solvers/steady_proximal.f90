@@ -15,7 +15,7 @@
 !>
 !> Memory: that of the guess, and one field.
 module steady_proximal
-   use asperity_parallel, only : any_process
+   use asperity_parallel, only : any_process, global_max
    use asperity_precision, only : dp, int64
    use field_sums, only : field_count, field_mean
    use normal_state, only : gap_measure_type, normal_problem_type
@@ -37,6 +37,7 @@ module steady_proximal
    integer, parameter :: allowance = 20          !! transforms, over the iterations that the splitting is allowed ...
    integer, parameter :: idle = 2                !! ... and those in which the error must be halved
    integer, parameter :: most_rounds = 6         !! of Newton's method in a step
+   integer, parameter :: slow = 3                !! round after which cells change sides one by one, if few are wrong
    integer, parameter :: most_directions = 100   !! of GMRES in a round
    integer, parameter :: patience = 2            !! rounds in which the changes of C need not become fewer
    real(dp), parameter :: few = 0.01_dp           !! changes, as a part of C, with which a step has settled
@@ -185,11 +186,24 @@ contains
          fewest = min(fewest, changes)
          if (since >= patience .and. step%outcome == unsettled) step%outcome = diverged
          if (step%outcome == diverged) return
+         if (step%outcome == settled .and. step%rounds >= slow) call keep_worst(guess, slack, wrong)
          guess%inside(:, :) = guess%inside .neqv. wrong
          if (.not. field_count(guess%inside) > 0.0_dp) step%outcome = diverged
          if (step%outcome == diverged) return
       end do
    end subroutine take_step
+
+   !> Keep only the cell that is most wrong among those that are to change sides. A few cells that change together can
+   !> alternate for ever, which cells that change one by one hardly do.
+   subroutine keep_worst(guess, slack, wrong)
+      type(guess_type), intent(in) :: guess
+      real(dp), intent(in) :: slack              !! overlap with which a cell stays open, m
+      logical, intent(inout) :: wrong(:, :)
+      real(dp), allocatable :: by(:, :)          !! how wrong a cell is, m
+
+      by = merge(-guess%soft*guess%pressure, guess%level - slack - guess%gap, guess%inside)
+      wrong = wrong .and. by >= global_max(maxval(by, mask=wrong))
+   end subroutine keep_worst
 
    !> Make the pressure of the step the one at which the springs are relaxed. The gap is then that without springs.
    subroutine move_centre(guess, operator, task, height)
