@@ -35,6 +35,9 @@
 !> slip (module `friction_form`). Each shortened step costs one product more. beta is formed with z_old instead of the old
 !> g, which is not kept: the preconditioner is symmetric, so that both agree as long as no point changes its state.
 !>
+!> In full contact of a periodic half-space, a uniform traction strains nothing and d.A d is round-off. Only the bounds then
+!> limit the step: alpha is chosen so that few points leave them (`length_to_bounds`).
+!>
 !> There is no proof that this converges. If it stalls, or finds no direction of descent, some steps of spectral
 !> projected gradients (module `friction_cg_gradient`) follow, and then the method continues.
 module friction_cg_fast
@@ -201,7 +204,7 @@ contains
          call operator%columns(columns_apply, now%form)
       end if
       call problem%spring%add_form(self%d, now%form)
-      if (problem%slipping == 0 .and. now%form <= strainless*problem%compliance*now%square) &
+      if (problem%slipping == 0 .and. now%slope > 0.0_dp .and. now%form <= strainless*problem%compliance*now%square) &
          now%form = now%slope/length_to_bounds(problem, self%d, now%square)
    end subroutine find_direction
 

@@ -1,7 +1,7 @@
 !> The start of a tangential solve from rest: the problem on a coarser grid, and its solution on the grid.
 !>
-!> A solve that starts with hardly any traction spends its first iterations on finding out which cells slip. On a grid with about
-!> a quarter of the cells along each side (module `coarse_fields`) each of these iterations costs a sixteenth. The
+!> A solve that starts with hardly any traction spends its first iterations on finding out which cells slip. On a grid with
+!> about a quarter of the cells along each side (module `coarse_fields`) each of these iterations costs a sixteenth. The
 !> coarse problem has the means of the pressure, the slopes, the displacement of the road and the tractions of the past over
 !> its cells. The tractions are interpolated between the centres of the coarse cells, and a cell of the grid starts as one
 !> that slips where more than a half of what surrounds it slips.

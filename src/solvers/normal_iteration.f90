@@ -25,7 +25,7 @@
 module normal_iteration
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
-   use normal_passes, only : new_direction, normal_work_type, overlap_with, predict_form, mean_stiffness
+   use normal_passes, only : mean_stiffness, new_direction, normal_work_type, overlap_with, predict_form
    use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type

@@ -18,7 +18,7 @@ module normal_passes
    implicit none
    private
 
-   public :: new_direction, new_normal_work, normal_work_type, overlap_with, predict_form, mean_stiffness, survey, &
+   public :: mean_stiffness, new_direction, new_normal_work, normal_work_type, overlap_with, predict_form, survey, &
       update_state
 
    !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
@@ -185,47 +185,32 @@ contains
       real(dp), intent(in) :: open_part                      !! of the cells
       real(dp), contiguous, intent(in) :: pressure(:, :)     !! Pa
       real(dp) :: stiffness                                  !! in the units of the model
-      real(dp) :: cells, form, touching
+      real(dp) :: cells, form
 
       cells = self%grid%cells()
       stiffness = of_open_cells/max(open_part, 1.0_dp/cells)
       if (max(self%grid%lx, self%grid%ly) < long*min(self%grid%lx, self%grid%ly)) return
-      call take_contact(self, pressure, touching)
+      call take_contact(self, pressure)
       associate (coarse => self%coarse)
-         form = coarse%predict_form(touching)
+         form = coarse%predict_form((1.0_dp - open_part)*cells)
          if (form > 0.0_dp) stiffness = min(stiffness, stiffer*cells*pi*coarse%kernel%compliance(pi/coarse%h)/form)
       end associate
    end function mean_stiffness
 
-   !> Compute the block means of the contact, 1 where there is pressure, and the number of cells.
-   subroutine take_contact(self, pressure, touching)
+   !> Compute the block means of a field that is 1 where there is pressure, and 0 elsewhere.
+   subroutine take_contact(self, pressure)
       type(normal_work_type), intent(inout) :: self
       real(dp), contiguous, intent(in) :: pressure(:, :)     !! Pa
-      real(dp), intent(out) :: touching
-      real(dp), allocatable :: column(:)
-      integer :: counts(self%grid%rows()), j, k, jb
+      integer :: jb
 
-      !$omp parallel default(none) shared(self, pressure, counts) private(j, k, jb, column) &
-      !$omp num_threads(self%threads)
-      allocate (column(self%grid%nx))
-      !$omp do schedule(dynamic)
+      !$omp parallel do default(none) shared(self, pressure) private(jb) schedule(dynamic) num_threads(self%threads)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
-         column(:) = 0.0_dp
-         do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            counts(j) = 0
-            do k = 1, self%active%runs(j)
-               associate (a => self%active%first(k, j), b => self%active%last(k, j))
-                  column(a:b) = column(a:b) + merge(1.0_dp, 0.0_dp, pressure(a:b, j) > 0.0_dp)
-                  counts(j) = counts(j) + count(pressure(a:b, j) > 0.0_dp)
-               end associate
-            end do
-         end do
-         call self%coarse%sum_blocks(column, self%coarse%mean(:, jb))
+         associate (first => self%coarse%first_y(jb), last => self%coarse%first_y(jb + 1) - 1)
+            call self%coarse%sum_blocks(real(count(pressure(:, first:last) > 0.0_dp, dim=2), dp), self%coarse%mean(:, jb))
+         end associate
          self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
       end do
-      !$omp end parallel
       call self%coarse%share_blocks(self%coarse%mean)
-      touching = row_total(counts)
    end subroutine take_contact
 
    !> Compute the direction in a row.

@@ -19,7 +19,6 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
-
    integer, parameter :: small = 16384         !! blocks below which one thread is faster
 
    !> The numbers per block. A variable of this type must not be copied.
