@@ -56,6 +56,7 @@ contains
       if (selected('line_contacts_along_x_and_y_agree')) call line_contacts_along_x_and_y_agree()
       if (selected('uniform_contact_moves_by_mean_mode')) call uniform_contact_moves_by_mean_mode()
       if (selected('full_contact_without_mean_compliance')) call full_contact_without_mean_compliance()
+      if (selected('motions_of_any_size_are_solved')) call motions_of_any_size_are_solved()
       if (selected('own_solution_is_kept')) call own_solution_is_kept()
       if (selected('expected_slip_is_a_good_start')) call expected_slip_is_a_good_start()
       if (selected('a_start_on_a_coarser_grid_changes_nothing')) call a_start_on_a_coarser_grid_changes_nothing()
@@ -866,6 +867,28 @@ contains
          end do
       end do
    end subroutine full_contact_without_mean_compliance
+
+   !> The smallest motions on a sloped road are solved like larger ones: tractions that are small compared with the
+   !> tangential component of the pressure must not be lost in its round-off. The motions go down to a velocity that is
+   !> meant to be zero and is only round-off.
+   subroutine motions_of_any_size_are_solved()
+      real(dp), parameter :: motions(5) = [1e-4_dp, 1e-7_dp, 1e-10_dp, 1e-13_dp, 1e-18_dp]
+      type(case_type) :: self
+      integer :: boundary, k
+
+      do boundary = boundary_periodic, boundary_free
+         do k = 1, size(motions)
+            call new_case(self, 40, 32, 1.0_dp, 0.8_dp, boundary, 0.5_dp, 0.0_dp)
+            call set_rough(self, 5, 0.3_dp, 0.2_dp)
+            self%law = new_friction_law('coulomb', 1.5_dp, 0.0_dp, 0.0_dp, .true., .true.)
+            self%drive_x = motions(k)
+            self%drive_y = -0.4_dp*motions(k)
+            call run_case(self, 'small motion', 1e-7_dp)
+            call check_that(self%result%iterations <= 60, 'number of iterations', [motions(k), real(self%result%iterations, dp)])
+            call end_case(self)
+         end do
+      end do
+   end subroutine motions_of_any_size_are_solved
 
    !> The solver returns at once if it starts from the solution. Tractions from a higher pressure are reduced
    !> to the bound.
