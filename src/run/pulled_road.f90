@@ -38,7 +38,7 @@ contains
       real(dp), intent(in) :: velocity(2)           !! of the road in the last step, m/s
 
       where (plan%pulled)
-         plan%velocity = merge(velocity, 0.0_dp, plan%dt > 0.0_dp)
+         plan%velocity = merge(velocity, 0.0_dp, plan%dt > 0.0_dp .and. .not. plan%new_speed)
          plan%road = road + plan%dt*plan%velocity
       end where
    end subroutine guess_road

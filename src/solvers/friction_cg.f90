@@ -291,10 +291,12 @@ contains
       end if
    end function reason
 
-   !> Move the ends of the springs until the total of T equals the pull. A move gains the part of the missing total that
-   !> it supplies. Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`)
-   !> if a move gained little. If nothing is gained in full slip, the pull exceeds the friction, and the road returns to
-   !> where the springs began.
+   !> Move the ends of the springs until the total of T equals the pull. A plain move, by the missing total times the
+   !> compliance of the springs, never goes beyond the solution, and gains the part of the missing total that it supplies.
+   !> Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`) if a move
+   !> gained little. If a longer move has gone too far, the ends are between the last two places, and this interval is
+   !> halved (`reach`) until plain moves are longer. If nothing is gained in full slip while the road moves further and
+   !> further from its place, the pull exceeds the friction, and the road returns to where the springs began.
    subroutine match_pull(self, problem, operator, required, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem
@@ -302,27 +304,37 @@ contains
       real(dp), intent(in) :: required               !! residual and missing part that suffice
       integer, intent(inout) :: iterations
       logical, intent(out) :: converged
-      real(dp) :: before(2), factor, first(2), gained
+      real(dp) :: before(2), after(2), factor, first(2), gained, plain(2), reach
       integer :: k, idle
+      logical :: leaves                              !! the move leads away from the place of the road
 
       self%pull%slides_off = problem%cells == 0 .and. self%pull%missing_part(problem) > 0.0_dp
       converged = .not. self%pull%slides_off
       if (problem%cells == 0) return
       first = problem%spring%end
       factor = 1.0_dp
+      reach = 0.0_dp
       idle = 0
       do k = 1, most_moves
          converged = problem%solved(required)
          if (.not. converged) return
          if (self%pull%missing_part(problem) <= self%tolerance) return
          before = self%pull%missing_total(problem)
-         call move_springs(self, problem, operator, factor*problem%spring%compliance*before, iterations)
+         plain = problem%spring%compliance*before
+         if (reach > 0.0_dp) factor = max(1.0_dp, reach/norm2(plain))
+         leaves = dot_product(plain, problem%spring%offset - self%pull%rest) > 0.0_dp
+         call move_springs(self, problem, operator, factor*plain, iterations)
          if (self%method%stopped) exit
-         gained = dot_product(before, before - self%pull%missing_total(problem)) &
-            /max(dot_product(before, before), tiny(1.0_dp))
-         idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp)
+         after = self%pull%missing_total(problem)
+         gained = dot_product(before, before - after)/max(dot_product(before, before), tiny(1.0_dp))
+         idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp .and. leaves)
          if (idle >= idle_moves) exit
-         factor = max(1.0_dp, min(10.0_dp*factor, factor/max(gained, 0.01_dp)))
+         if (factor > 1.0_dp .and. (reach > 0.0_dp .or. gained > 1.0_dp)) then
+            reach = 0.5_dp*factor*norm2(plain)
+         else
+            reach = 0.0_dp
+            factor = max(1.0_dp, min(10.0_dp*factor, factor/max(gained, 0.01_dp)))
+         end if
       end do
 
       ! The tolerance was not reached. What was reached may suffice.

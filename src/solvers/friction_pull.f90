@@ -34,6 +34,7 @@ module friction_pull
       !> With a mass: the compliance of the offset to mean T - traction, m for G = 1 Pa. 0: the total of T equals the pull.
       real(dp) :: mass_compliance(2) = 0.0_dp
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
+      real(dp) :: rest(2) = 0.0_dp               !! offset of the springs at which the road has not moved
       real(dp), private :: mean_mode(2) = 0.0_dp !! symbols that were removed from the operator
    contains
       procedure :: attach
@@ -54,6 +55,7 @@ contains
       integer :: c
 
       self%slides_off = .false.
+      self%rest = 0.0_dp
       if (.not. any(self%along)) return
       cells = operator%grid%cells()
       touching = max(1.0_dp, field_count(problem%fields%contact /= contact_open))
@@ -66,8 +68,8 @@ contains
          ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
          problem%spring%compliance(c) = softer*problem%compliance/sqrt(touching)
          if (self%mass_compliance(c) > 0.0_dp) problem%spring%compliance(c) = self%mass_compliance(c)/cells
-         problem%spring%end(c) = self%offset(c) &
-            - self%mean_mode(c)*(problem%spring%pull(c) + past_total(problem, c))
+         self%rest(c) = -self%mean_mode(c)*(problem%spring%pull(c) + past_total(problem, c))
+         problem%spring%end(c) = self%rest(c) + self%offset(c)
          problem%mean_compliance(c) = merge(problem%spring%compliance(c), 0.0_dp, &
             problem%spring%compliance(c)*cells > soft)
       end do
@@ -113,8 +115,9 @@ contains
          self%along .and. .not. self%mass_compliance > 0.0_dp)
    end function missing_total
 
-   !> Size of `missing_total` relative to the largest of three forces: the pull, the total, and the force that
-   !> would displace road and contact as far as they are displaced.
+   !> Size of `missing_total` relative to the largest of three forces: the pull, the total, and the force that would
+   !> displace the contact as far as it is displaced. The last one is at most the friction of all cells, because a road that
+   !> slides may be displaced by any distance.
    pure function missing_part(self, problem) result(part)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
@@ -124,7 +127,7 @@ contains
       part = norm2(self%missing_total(problem))
       if (.not. part > 0.0_dp) return
       compliance = maxval(problem%spring%compliance)/softer + maxval(self%mean_mode)
-      size = max(norm2(problem%spring%pull), norm2(problem%spring%total), problem%scale/compliance)
+      size = max(norm2(problem%spring%pull), norm2(problem%spring%total), min(problem%scale/compliance, problem%bounds))
       part = part/size
    end function missing_part
 
