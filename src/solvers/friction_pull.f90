@@ -17,6 +17,7 @@ module friction_pull
    use friction_law, only : contact_open
    use friction_problem, only : friction_problem_type
    use asperity_precision, only : dp
+   use road_spring, only : road_spring_type
    implicit none
    private
 
@@ -36,6 +37,9 @@ module friction_pull
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
       real(dp) :: rest(2) = 0.0_dp               !! offset of the springs at which the road has not moved
       real(dp), private :: mean_mode(2) = 0.0_dp !! symbols that were removed from the operator
+      !> A mass that is softer than the springs: the compliance of its offset to the missing total, and the offset
+      !> at which the total equals the pull. 0: the springs are the mass, or there is no mass.
+      real(dp), private :: soft_mass(2) = 0.0_dp, mass_place(2) = 0.0_dp
    contains
       procedure :: attach
       procedure :: detach
@@ -56,6 +60,7 @@ contains
 
       self%slides_off = .false.
       self%rest = 0.0_dp
+      self%soft_mass = 0.0_dp
       if (.not. any(self%along)) return
       cells = operator%grid%cells()
       touching = max(1.0_dp, field_count(problem%fields%contact /= contact_open))
@@ -67,9 +72,9 @@ contains
          problem%spring%pull(c) = self%traction(c)*cells
          ! A patch of n cells is about as stiff as sqrt(n) cells side by side.
          problem%spring%compliance(c) = softer*problem%compliance/sqrt(touching)
-         if (self%mass_compliance(c) > 0.0_dp) problem%spring%compliance(c) = self%mass_compliance(c)/cells
          self%rest(c) = -self%mean_mode(c)*(problem%spring%pull(c) + past_total(problem, c))
          problem%spring%end(c) = self%rest(c) + self%offset(c)
+         if (self%mass_compliance(c) > 0.0_dp) call hang_mass(self, problem%spring, c, self%mass_compliance(c)/cells)
          problem%mean_compliance(c) = merge(problem%spring%compliance(c), 0.0_dp, &
             problem%spring%compliance(c)*cells > soft)
       end do
@@ -78,6 +83,19 @@ contains
       problem%least_scale = max(problem%least_scale, norm2(self%mean_mode*problem%spring%pull), &
          problem%compliance/sqrt(touching)*norm2(problem%spring%pull))
    end subroutine attach
+
+   !> Let a mass take the place of a spring, unless it is softer. It is so in steps that are long compared with the period of
+   !> the block. The end of the spring is then moved until the offset of the road is that of the mass.
+   pure subroutine hang_mass(self, spring, c, compliance)
+      type(friction_pull_type), intent(inout) :: self
+      type(road_spring_type), intent(inout) :: spring
+      integer, intent(in) :: c                   !! direction
+      real(dp), intent(in) :: compliance         !! of the mass, m/Pa of the sum
+
+      if (compliance > spring%compliance(c)) self%soft_mass(c) = compliance
+      spring%compliance(c) = min(compliance, spring%compliance(c))
+      self%mass_place(c) = spring%end(c)
+   end subroutine hang_mass
 
    !> Restore the mean mode of the operator, and add the displacement of this mode to the offset of the road.
    subroutine detach(self, problem, operator)
@@ -105,14 +123,16 @@ contains
       if (associated(problem%fields%past)) total = field_sum(problem%fields%past(:, c, :))
    end function past_total
 
-   !> The pull minus the total of T, Pa; 0 along a direction that is not pulled or whose force acts on a mass.
+   !> The pull minus the total of T and the force that accelerates the mass, Pa; 0 along a direction that is not pulled, and
+   !> where the springs are the mass.
    pure function missing_total(self, problem) result(difference)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: difference(2)
 
       difference = merge(problem%spring%pull - problem%spring%total, 0.0_dp, &
-         self%along .and. .not. self%mass_compliance > 0.0_dp)
+         self%along .and. (self%soft_mass > 0.0_dp .or. .not. self%mass_compliance > 0.0_dp))
+      where (self%soft_mass > 0.0_dp) difference = difference + (self%mass_place - problem%spring%offset)/self%soft_mass
    end function missing_total
 
    !> Size of `missing_total` relative to the largest of three forces: the pull, the total, and the force that would
