@@ -8,7 +8,7 @@ module test_simulation_pull
    use asperity_precision, only : dp
    use asperity_simulation, only : new_simulation, simulation_type
    use simulation_runs, only : check_books, last, nl, record_type, run_case
-   use text_tools, only : exact_text
+   use text_tools, only : exact_text, to_text
    implicit none
    private
 
@@ -28,7 +28,9 @@ contains
       end if
       if (selected('long_travel_is_reported_once')) call long_travel_is_reported_once()
       if (selected('pull_beyond_friction_is_reported')) call pull_beyond_friction_is_reported()
+      if (selected('a_smaller_pull_lets_a_sliding_road_spring_back')) call a_smaller_pull_lets_a_sliding_road_spring_back()
       if (selected('pulled_mass_accelerates')) call pulled_mass_accelerates()
+      if (selected('slow_steps_do_not_need_the_mass')) call slow_steps_do_not_need_the_mass()
       if (selected('pull_excludes_other_variables')) call pull_excludes_other_variables()
    end subroutine run_simulation_pull
 
@@ -199,6 +201,63 @@ contains
       call check_close(sim%state%row%traction_y/sim%state%row%traction_x, 4.0_dp/3.0_dp, 1e-6_dp, 'beyond: the direction')
       call sim%destroy()
    end subroutine pull_beyond_friction_is_reported
+
+   !> A line contact slides, and is then held by the part q of the sliding force. In plane strain with nu = 1/2 the normal and
+   !> the tangential displacements of equal forces are equal. The traction is therefore mu (2 P' - P), where P' is the
+   !> pressure under the part (1 + q)/2 of the load (Ciavarella 1998, Jaeger 1998), and the road springs back by 2 mu times
+   !> the difference of the two approaches. On coarse grids the approaches depend on where the summit lies between the cells.
+   subroutine a_smaller_pull_lets_a_sliding_road_spring_back()
+      integer, parameter :: cells(5) = [16, 17, 24, 48, 96]
+      real(dp), parameter :: parts(4) = [0.9_dp, 0.5_dp, 0.0_dp, -0.7_dp], mu = 0.3_dp, load = 2e4_dp
+      type(record_type) :: pulled, pressed
+      character(:), allocatable :: contact
+      real(dp) :: back
+      integer :: i, k
+
+      do k = 1, size(cells)
+         contact = '&grid nx = '//to_text(cells(k))//', ny = 1, lx = 1e-3 /'//nl// &
+            '&surface shape = ''sine'', amplitude = 1e-5, wavelength = 1e-3 /'//nl// &
+            '&material shear_modulus = 1e6, poisson = 0.5 /'//nl//'&solver tolerance = 1e-8 /'//nl
+         do i = 1, size(parts)
+            call run_case(contact//'&friction law = ''coulomb'', coefficient = 0.3, slope_effect = .false. /'//nl// &
+               '&phase pressure = 2e4 /'//nl//'&phase duration = 1, steps = 4, velocity_x = 2e-4 /'//nl// &
+               '&phase duration = 1, steps = 1, ramp = ''linear'', traction_x = '//exact_text(parts(i)*mu*load)//' /', &
+               'springs back', pulled)
+            call run_case(contact//'&phase pressure = 2e4 /'//nl// &
+               '&phase pressure = '//exact_text(0.5_dp*(1.0_dp + parts(i))*load)//' /', 'approach', pressed)
+            back = 2.0_dp*mu*(pressed%rows(0)%displacement - pressed%rows(1)%displacement)
+            call check_close(abs(pulled%rows(5)%friction), abs(parts(i))*mu, 1e-5_dp, 'springs back: force')
+            call check_close(pulled%rows(4)%road_x - pulled%rows(5)%road_x, back, &
+               merge(0.1_dp, 0.3_dp, cells(k) >= 48)*back, 'springs back: way')
+         end do
+      end do
+   end subroutine a_smaller_pull_lets_a_sliding_road_spring_back
+
+   !> In steps much longer than the period of a block its mass does not matter: the road is where a force without a mass pulls
+   !> it.
+   subroutine slow_steps_do_not_need_the_mass()
+      real(dp), parameter :: durations(3) = [5.0_dp, 50.0_dp, 5000.0_dp]
+      character(*), parameter :: slope(2) = [character(7) :: '.true.', '.false.']
+      type(record_type) :: heavy, light
+      character(:), allocatable :: solid, rest
+      integer :: i, k
+
+      do i = 1, size(slope)
+         do k = 1, size(durations)
+            solid = '&grid nx = 16, ny = 1, lx = 1e-3 /'//nl// &
+               '&surface shape = ''sine'', amplitude = 1e-5, wavelength = 1e-3 /'//nl// &
+               '&material shear_modulus = 1e6, poisson = 0.5, thickness = 1e-3'
+            rest = ' /'//nl//'&friction law = ''coulomb'', coefficient = 0.3, slope_effect = '//trim(slope(i))//' /'//nl// &
+               '&phase pressure = 2e4 /'//nl//'&phase pressure = 1e4, duration = '//exact_text(durations(k))// &
+               ', steps = 2, traction_x = 500, ramp = ''linear'' /'
+            call run_case(solid//', density = 1e3'//rest, 'heavy', heavy)
+            call run_case(solid//rest, 'light', light)
+            call check_close(heavy%rows(2)%road_x, light%rows(2)%road_x, 1e-4_dp*light%rows(2)%road_x, 'slow steps: way')
+            call check_close(heavy%rows(2)%friction, light%rows(2)%friction, 1e-4_dp*light%rows(2)%friction, &
+               'slow steps: friction')
+         end do
+      end do
+   end subroutine slow_steps_do_not_need_the_mass
 
    !> A block with mass that is pulled suddenly: m a = F - mu p, and its rubber is sheared at once.
    subroutine pulled_mass_accelerates()
