@@ -31,6 +31,7 @@ contains
       if (selected('a_smaller_pull_lets_a_sliding_road_spring_back')) call a_smaller_pull_lets_a_sliding_road_spring_back()
       if (selected('pulled_mass_accelerates')) call pulled_mass_accelerates()
       if (selected('slow_steps_do_not_need_the_mass')) call slow_steps_do_not_need_the_mass()
+      if (selected('a_mass_accelerates_in_long_steps')) call a_mass_accelerates_in_long_steps()
       if (selected('pull_excludes_other_variables')) call pull_excludes_other_variables()
    end subroutine run_simulation_pull
 
@@ -232,6 +233,25 @@ contains
          end do
       end do
    end subroutine a_smaller_pull_lets_a_sliding_road_spring_back
+
+   !> A pull of more than the friction accelerates the mass in steps of any length.
+   subroutine a_mass_accelerates_in_long_steps()
+      real(dp), parameter :: durations(3) = [0.1_dp, 1.0_dp, 1e4_dp], acceleration = 2e4_dp, strained = 6e-5_dp
+      type(record_type) :: record
+      integer :: i, k
+
+      do i = 1, size(durations)
+         call run_case('&grid nx = 8, ny = 8, lx = 1e-3 /'//nl//'&surface shape = ''flat'' /'//nl// &
+            '&material shear_modulus = 1e6, thickness = 1e-3, density = 1000 /'//nl// &
+            '&friction law = ''coulomb'', coefficient = 0.5 /'//nl//'&phase pressure = 1e5 /'//nl// &
+            '&phase traction_x = 6e4, duration = '//exact_text(durations(i))//', steps = 4 /', 'long steps', record)
+         do k = 2, 5
+            associate (row => record%rows(k))
+               call check_close(row%road_x, 0.5_dp*acceleration*row%time**2 + strained, 1e-6_dp*row%road_x, 'long steps: way')
+            end associate
+         end do
+      end do
+   end subroutine a_mass_accelerates_in_long_steps
 
    !> In steps much longer than the period of a block its mass does not matter: the road is where a force without a mass pulls
    !> it.

@@ -295,7 +295,8 @@ contains
    !> compliance of the springs, never goes beyond the solution, and gains the part of the missing total that it supplies.
    !> Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`) if a move
    !> gained little. If a longer move has gone too far, the ends are between the last two places, and this interval is
-   !> halved (`reach`) until plain moves are longer. If nothing is gained in full slip while the road moves further and
+   !> halved (`reach`) until plain moves are longer. A mass softer than the springs may move far; in full slip its place
+   !> follows from the force that is missing. If nothing is gained in full slip while the road moves further and
    !> further from its place, the pull exceeds the friction, and the road returns to where the springs began.
    subroutine match_pull(self, problem, operator, required, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
@@ -308,9 +309,13 @@ contains
       integer :: k, idle
       logical :: leaves                              !! the move leads away from the place of the road
 
-      self%pull%slides_off = problem%cells == 0 .and. self%pull%missing_part(problem) > 0.0_dp
-      converged = .not. self%pull%slides_off
-      if (problem%cells == 0) return
+      if (problem%cells == 0) then
+         ! Without contact only a mass can take the pull.
+         call problem%move_spring_end(self%pull%softer_mass(problem)*problem%spring%compliance*self%pull%missing_total(problem))
+         self%pull%slides_off = self%pull%missing_part(problem) > self%tolerance
+         converged = .not. self%pull%slides_off
+         return
+      end if
       first = problem%spring%end
       factor = 1.0_dp
       reach = 0.0_dp
@@ -321,8 +326,13 @@ contains
          if (self%pull%missing_part(problem) <= self%tolerance) return
          before = self%pull%missing_total(problem)
          plain = problem%spring%compliance*before
-         if (reach > 0.0_dp) factor = max(1.0_dp, reach/norm2(plain))
-         leaves = dot_product(plain, problem%spring%offset - self%pull%rest) > 0.0_dp
+         if (reach > 0.0_dp) then
+            factor = max(1.0_dp, reach/norm2(plain))
+         else if (problem%slipping == problem%cells) then
+            factor = max(factor, self%pull%softer_mass(problem))
+         end if
+         leaves = dot_product(plain, problem%spring%offset - self%pull%rest) > 0.0_dp &
+            .and. .not. self%pull%softer_mass(problem) > 0.0_dp
          call move_springs(self, problem, operator, factor*plain, iterations)
          if (self%method%stopped) exit
          after = self%pull%missing_total(problem)

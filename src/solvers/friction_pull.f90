@@ -45,6 +45,7 @@ module friction_pull
       procedure :: detach
       procedure :: missing_part
       procedure :: missing_total
+      procedure :: softer_mass
    end type friction_pull_type
 
 contains
@@ -135,19 +136,33 @@ contains
       where (self%soft_mass > 0.0_dp) difference = difference + (self%mass_place - problem%spring%offset)/self%soft_mass
    end function missing_total
 
-   !> Size of `missing_total` relative to the largest of three forces: the pull, the total, and the force that would
-   !> displace the contact as far as it is displaced. The last one is at most the friction of all cells, because a road that
-   !> slides may be displaced by any distance.
+   !> How many times as soft as its spring a mass is; 0 if there is no such mass. A move of the spring by this multiple of a
+   !> plain one brings the mass to its place if all points slip before and after it.
+   pure function softer_mass(self, problem) result(ratio)
+      class(friction_pull_type), intent(in) :: self
+      type(friction_problem_type), intent(in) :: problem
+      real(dp) :: ratio
+
+      ratio = 0.0_dp
+      if (any(self%soft_mass > 0.0_dp)) ratio = maxval(self%soft_mass/problem%spring%compliance, self%soft_mass > 0.0_dp)
+   end function softer_mass
+
+   !> Size of `missing_total` relative to the largest of four forces: the pull, the total, the force that would displace the
+   !> contact as far as it is displaced, and the one that would bring a soft mass to its place. The third is at most the
+   !> friction of all cells, because a road that slides may be displaced by any distance.
    pure function missing_part(self, problem) result(part)
       class(friction_pull_type), intent(in) :: self
       type(friction_problem_type), intent(in) :: problem
       real(dp) :: part
-      real(dp) :: compliance, size
+      real(dp) :: compliance, inertial(2), size
 
       part = norm2(self%missing_total(problem))
       if (.not. part > 0.0_dp) return
       compliance = maxval(problem%spring%compliance)/softer + maxval(self%mean_mode)
-      size = max(norm2(problem%spring%pull), norm2(problem%spring%total), min(problem%scale/compliance, problem%bounds))
+      inertial = 0.0_dp
+      where (self%soft_mass > 0.0_dp) inertial = self%mass_place/self%soft_mass
+      size = max(norm2(problem%spring%pull), norm2(problem%spring%total), &
+         min(problem%scale/compliance, problem%bounds), norm2(inertial))
       part = part/size
    end function missing_part
 
