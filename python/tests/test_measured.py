@@ -408,6 +408,34 @@ def test_transpose_takes_arrays_as_images_have_them(tmp_path):
     assert (turned.lx, turned.ly) == pytest.approx((LY * 1e-6, LX * 1e-6))
 
 
+def test_only_edges_that_do_not_fit_are_said_not_to(tmp_path):
+    """A file without a mark of periodicity may hold a periodic map all the same."""
+    x = np.arange(96) / 96
+    whole = np.sin(4 * np.pi * x)[:, None] + np.cos(2 * np.pi * np.arange(40) / 40)[None, :]
+    half = np.sin(np.pi * x)[:, None] + np.arange(40)[None, :] / 40
+    notes = {}
+    for name, heights in (("whole", whole), ("half", half), ("flat", np.ones((96, 40)))):
+        np.save(tmp_path / f"{name}.npy", heights)
+        notes[name] = load(tmp_path / f"{name}.npy", unit="um", size=(960.0, 400.0)).notes
+    assert "although opposite edges fit" in notes["whole"][-1]
+    assert "opposite edges do not fit" in notes["half"][-1]
+    assert not any("do not fit" in note for note in notes["flat"])
+
+    for name, length in (("line", 96), ("part", 88)):
+        wave = np.sin(4 * np.pi * np.arange(length) / 96)
+        np.savetxt(tmp_path / f"{name}.txt", np.c_[10.0 * np.arange(length), wave],
+                   header="x (um) z (um)")
+        notes[name] = load(tmp_path / f"{name}.txt").notes
+    assert "but its ends fit" in notes["line"][-1]
+    assert "the ends of the line do not fit" in notes["part"][-1]
+
+
+def test_numbers_that_are_no_heights_are_named(tmp_path):
+    np.save(tmp_path / "complex.npy", np.ones((8, 6), dtype=complex))
+    with pytest.raises(OSError, match=r"complex128 and the shape \(8, 6\): heights must be real"):
+        load(tmp_path / "complex.npy", unit="um", size=(8.0, 6.0))
+
+
 def test_levelling(tmp_path):
     """An exact plane is removed to round-off, a paraboloid only by 'curvature'."""
     j, i = np.mgrid[0:NY, 0:NX]

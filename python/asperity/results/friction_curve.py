@@ -368,7 +368,9 @@ class FrictionCurve:
         points = np.ndindex(self.values["friction"].shape[:3])
         for at, row in zip(points, self.rows(), strict=True):
             low, high = row[4:6]
-            known = f"{low:.4f}..{high:.4f}" if math.isfinite(low) else "-"
+            # Adding 0 turns a negative zero into zero.
+            known = (f"{round(low, 4) + 0.0:.4f}..{round(high, 4) + 0.0:.4f}"
+                     if math.isfinite(low) else "-")
             cells = (f"{row[0]:.4g}", f"{row[1]:g}", f"{row[2]:.4g}", f"{row[3]:.4f}", known,
                      f"{row[6]:.4f}", f"{row[7]:.4g}", f"{row[9]:.4f}", str(row[10]))
             lines.append("  ".join(cell.rjust(max(9, len(head)))

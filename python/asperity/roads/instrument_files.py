@@ -58,6 +58,19 @@ def channels(path: str | Path) -> list[str]:
         return [_channel_line(channel) for channel in reader.channels]
 
 
+def _unknown(path: Path) -> str:
+    """Say why a file has no format that is known."""
+    if path.suffix == ".npy":
+        try:
+            array = np.load(path, mmap_mode="r", allow_pickle=False)
+        except (OSError, ValueError):
+            pass
+        else:
+            return (f"holds numbers of the type {array.dtype} and the shape {array.shape}:"
+                    " heights must be real numbers in two dimensions")
+    return "is of no format that SurfaceTopography knows"
+
+
 def _open(path: Path) -> Any:
     """Open a file with SurfaceTopography."""
     try:
@@ -82,7 +95,7 @@ def _open(path: Path) -> Any:
             return text_map(path)
         except ValueError as fault:
             if re.search("is not a text file|no table of numbers", str(fault)):
-                raise OSError(f"{path}: is of no format that SurfaceTopography knows") from None
+                raise OSError(f"{path}: {_unknown(path)}") from None
             raise
     try:
         empty = not reader.channels

@@ -30,6 +30,9 @@ FloatArray = NDArray[np.float64]
 LEVELS = ("none", "mean", "tilt", "curvature")
 WINDOWS = ("hann", "tukey")
 
+# Opposite edges fit if the mean square of their steps is at most this multiple of that inside.
+_SIMILAR = 4.0
+
 
 @dataclass(frozen=True)
 class MeasuredSurface:
@@ -367,9 +370,30 @@ def _advice(work: MapWork, level: str) -> list[str]:
     if variance == 0.0:
         notes.append("the map is flat")
     if not work.periodic:
-        notes.append("opposite edges do not fit: the boundary is taken as free;"
-                     " periodic = 'tukey' (--periodic) makes the map periodic"
-                     if work.height.shape[0] > 1 else
-                     "the ends of the line do not fit, and a line needs a periodic boundary:"
-                     " periodic = 'tukey' (--periodic) makes them fit")
+        notes.append(_edge_note(work.height))
     return notes
+
+
+def _edge_note(height: FloatArray) -> str:
+    """Return the note on the edges of a map whose file does not say that it is periodic."""
+    line = height.shape[0] == 1
+    if _edges_fit(height):
+        return ("the file does not say that the line is periodic, but its ends fit"
+                if line else
+                "the file does not say that the map is periodic: the boundary is taken as free,"
+                " although opposite edges fit")
+    return ("the ends of the line do not fit, and a line needs a periodic boundary:"
+            " periodic = 'tukey' (--periodic) makes them fit"
+            if line else
+            "opposite edges do not fit: the boundary is taken as free;"
+            " periodic = 'tukey' (--periodic) makes the map periodic")
+
+
+def _edges_fit(height: FloatArray) -> bool:
+    """Tell whether the steps between opposite edges are about as high as those inside."""
+    for axis in (axis for axis in (0, 1) if height.shape[axis] > 1):
+        inside = np.diff(height, axis=axis)
+        across = np.take(height, 0, axis) - np.take(height, -1, axis)
+        if np.mean(across**2) > _SIMILAR * np.mean(inside**2):
+            return False
+    return True
