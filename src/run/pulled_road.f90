@@ -1,7 +1,7 @@
 !> A road that is pulled by a force instead of driven at a velocity: its expected and its computed position.
 !>
 !> The tangential solver finds the motion of the road in a row (modules `friction_pull` and `road_pull`). Before
-!> that, the row uses the motion of the last step as a guess. The guess affects results only within the
+!> that, the row uses the motion of the last step as a guess, or rest where a pull begins. The guess affects results only within the
 !> tolerance, because heights are read at U_T - D, and this difference does not depend on it.
 module pulled_road
    use asperity_precision, only : dp
@@ -31,7 +31,9 @@ contains
       if (any(abs(drive) > 0.0_dp)) direction = drive/norm2(drive)
    end subroutine drive_direction
 
-   !> Assume that the road moves as in the last step along the directions in which it is pulled.
+   !> Assume that the road moves as in the last step along the directions in which it is pulled. Where a pull begins, the road
+   !> is assumed to rest: its speed before is no guide to how far the pull moves it, and a pass that reads the road at a wrong
+   !> place may find a contact that cannot hold the pull.
    subroutine guess_road(plan, road, velocity)
       type(planned_row_type), intent(inout) :: plan
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
