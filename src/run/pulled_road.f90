@@ -1,8 +1,8 @@
 !> A road that is pulled by a force instead of driven at a velocity: its expected and its computed position.
 !>
 !> The tangential solver finds the motion of the road in a row (modules `friction_pull` and `road_pull`). Before
-!> that, the row uses the motion of the last step as a guess, or rest where a pull begins. The guess affects results only within the
-!> tolerance, because heights are read at U_T - D, and this difference does not depend on it.
+!> that, the row uses the motion of the last step as a guess, or rest where a pull begins. The guess affects results
+!> only within the tolerance, because heights are read at U_T - D, and this difference does not depend on it.
 module pulled_road
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
