@@ -99,6 +99,16 @@ def test_rows_in_any_order():
     assert first.material == other.material
 
 
+def test_exchanged_columns_are_warned_of():
+    omega = np.logspace(-2, 8, 80)
+    modulus = Prony(1e6, 2e6 * np.ones(9), np.logspace(-7, 1, 9)).complex_modulus(omega)
+    right = fit_dma(DmaTable(omega, modulus.real, modulus.imag))
+    wrong = fit_dma(DmaTable(omega, modulus.imag, modulus.real))
+    assert not any("right columns" in note for note in right.notes)
+    assert any("misses the data by a factor" in note and "right columns" in note
+               for note in wrong.notes)
+
+
 def test_the_plateau_is_positive_where_the_data_do_not_reach_it():
     """For a Maxwell fluid the plateau is kept above zero, and a note says so."""
     fluid = Prony(0.0, [1e6, 1e6], [1e-2, 1.0])

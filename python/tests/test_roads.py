@@ -20,7 +20,13 @@ from asperity.roads.joins import (
 from asperity.roads.measured import MeasuredSurface
 from asperity.roads.outliers import find_outliers
 from asperity.roads.patches import MeasuredRoad, low_pass, rested
-from asperity.roads.spectra import Spectrum, isotropic_of_profile, join_spectra, spectrum_of_map
+from asperity.roads.spectra import (
+    Spectrum,
+    isotropic_of_profile,
+    join_spectra,
+    name_of_several,
+    spectrum_of_map,
+)
 
 
 def road(cells=256, long=0.25, short=8 / 256, seed=1):
@@ -306,6 +312,16 @@ def test_line_scans_have_the_spectrum_of_their_road():
         inside = (k > found.wavenumber[0]) & (k < found.wavenumber[-1])
         ratios.append(np.mean(np.log10(found.at(k[inside]) / spectrum.at(k[inside]))))
     assert abs(np.mean(ratios)) < 0.15
+
+
+def test_the_name_of_many_roads_fits_into_a_title():
+    assert name_of_several(["a.csv", "b.csv", "a.csv"]) == "a.csv and b.csv"
+    many = name_of_several(f"profile_{k:03d}.csv" for k in range(40))
+    assert many == "profile_000.csv and 39 others"
+    k = np.logspace(3, 5, 20)
+    joined = join_spectra([Spectrum(k, k**-3.6, name=f"profile_{i:03d}.csv") for i in range(40)])
+    assert joined.name == many
+    assert len(name_of_several(["x" * 250])) < 200
 
 
 def test_scans_are_joined_within_their_ranges():

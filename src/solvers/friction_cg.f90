@@ -292,11 +292,12 @@ contains
    end function reason
 
    !> Move the ends of the springs until the total of T equals the pull. A plain move, by the missing total times the
-   !> compliance of the springs, never goes beyond the solution, and gains the part of the missing total that it supplies.
+   !> compliance of the springs, does not go beyond the solution (with slopes this is not proved), and gains the part of the
+   !> missing total that it supplies.
    !> Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`) if a move
    !> gained little. If a longer move has gone too far, the ends are between the last two places, and this interval is
-   !> halved (`reach`) until plain moves are longer. A mass softer than the springs may move far; in full slip its place
-   !> follows from the force that is missing. If nothing is gained in full slip while the road moves further and
+   !> halved (`reach`) until plain moves are longer. A mass that is softer than the springs may move far; if all points slip, its
+   !> place follows at once from the force that is missing. If nothing is gained in full slip while the road moves further and
    !> further from its place, the pull exceeds the friction, and the road returns to where the springs began.
    subroutine match_pull(self, problem, operator, required, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
@@ -311,7 +312,7 @@ contains
 
       if (problem%cells == 0) then
          ! Without contact only a mass can take the pull.
-         call problem%move_spring_end(self%pull%softer_mass(problem)*problem%spring%compliance*self%pull%missing_total(problem))
+         call problem%move_spring_end(self%pull%softness*problem%spring%compliance*self%pull%missing_total(problem))
          self%pull%slides_off = self%pull%missing_part(problem) > self%tolerance
          converged = .not. self%pull%slides_off
          return
@@ -329,10 +330,10 @@ contains
          if (reach > 0.0_dp) then
             factor = max(1.0_dp, reach/norm2(plain))
          else if (problem%slipping == problem%cells) then
-            factor = max(factor, self%pull%softer_mass(problem))
+            factor = max(factor, self%pull%softness)
          end if
          leaves = dot_product(plain, problem%spring%offset - self%pull%rest) > 0.0_dp &
-            .and. .not. self%pull%softer_mass(problem) > 0.0_dp
+            .and. .not. self%pull%softness > 0.0_dp
          call move_springs(self, problem, operator, factor*plain, iterations)
          if (self%method%stopped) exit
          after = self%pull%missing_total(problem)

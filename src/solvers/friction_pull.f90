@@ -36,6 +36,9 @@ module friction_pull
       real(dp) :: mass_compliance(2) = 0.0_dp
       logical :: slides_off = .false.            !! out: the pull is more than the friction can hold
       real(dp) :: rest(2) = 0.0_dp               !! offset of the springs at which the road has not moved
+      !> How many times as soft as its spring a mass is; 0 if no mass is softer. A move of the spring by this multiple of a
+      !> plain one brings the mass to its place if all points slip before and after it.
+      real(dp) :: softness = 0.0_dp
       real(dp), private :: mean_mode(2) = 0.0_dp !! symbols that were removed from the operator
       !> A mass that is softer than the springs: the compliance of its offset to the missing total, and the offset
       !> at which the total equals the pull. 0: the springs are the mass, or there is no mass.
@@ -45,7 +48,6 @@ module friction_pull
       procedure :: detach
       procedure :: missing_part
       procedure :: missing_total
-      procedure :: softer_mass
    end type friction_pull_type
 
 contains
@@ -61,6 +63,7 @@ contains
 
       self%slides_off = .false.
       self%rest = 0.0_dp
+      self%softness = 0.0_dp
       self%soft_mass = 0.0_dp
       if (.not. any(self%along)) return
       cells = operator%grid%cells()
@@ -85,17 +88,21 @@ contains
          problem%compliance/sqrt(touching)*norm2(problem%spring%pull))
    end subroutine attach
 
-   !> Let a mass take the place of a spring, unless it is softer. It is so in steps that are long compared with the period of
-   !> the block. The end of the spring is then moved until the offset of the road is that of the mass.
+   !> Let a mass take the place of a spring. In steps much longer than the period of the block the mass is softer than the
+   !> spring; the spring then stays, and its end is moved until the offset of the road is that of the mass.
    pure subroutine hang_mass(self, spring, c, compliance)
       type(friction_pull_type), intent(inout) :: self
       type(road_spring_type), intent(inout) :: spring
       integer, intent(in) :: c                   !! direction
       real(dp), intent(in) :: compliance         !! of the mass, m/Pa of the sum
 
-      if (compliance > spring%compliance(c)) self%soft_mass(c) = compliance
-      spring%compliance(c) = min(compliance, spring%compliance(c))
-      self%mass_place(c) = spring%end(c)
+      if (compliance > spring%compliance(c)) then
+         self%softness = max(self%softness, compliance/spring%compliance(c))
+         self%soft_mass(c) = compliance
+         self%mass_place(c) = spring%end(c)
+      else
+         spring%compliance(c) = compliance
+      end if
    end subroutine hang_mass
 
    !> Restore the mean mode of the operator, and add the displacement of this mode to the offset of the road.
@@ -135,17 +142,6 @@ contains
          self%along .and. (self%soft_mass > 0.0_dp .or. .not. self%mass_compliance > 0.0_dp))
       where (self%soft_mass > 0.0_dp) difference = difference + (self%mass_place - problem%spring%offset)/self%soft_mass
    end function missing_total
-
-   !> How many times as soft as its spring a mass is; 0 if there is no such mass. A move of the spring by this multiple of a
-   !> plain one brings the mass to its place if all points slip before and after it.
-   pure function softer_mass(self, problem) result(ratio)
-      class(friction_pull_type), intent(in) :: self
-      type(friction_problem_type), intent(in) :: problem
-      real(dp) :: ratio
-
-      ratio = 0.0_dp
-      if (any(self%soft_mass > 0.0_dp)) ratio = maxval(self%soft_mass/problem%spring%compliance, self%soft_mass > 0.0_dp)
-   end function softer_mass
 
    !> Size of `missing_total` relative to the largest of four forces: the pull, the total, the force that would displace the
    !> contact as far as it is displaced, and the one that would bring a soft mass to its place. The third is at most the

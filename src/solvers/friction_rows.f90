@@ -153,7 +153,7 @@ contains
          xx = xx + arrived*max(1.0_dp - axis_x**2, 0.0_dp)
          xy = xy - arrived*axis_x*axis_y
          yy = yy + arrived*max(1.0_dp - axis_y**2, 0.0_dp)
-         ! A T inside its bound stays as it is: T* + D would only be T up to the round-off of T*, against which T may be small.
+         ! A T inside its bound stays as it is. The sum T* + D has the round-off of T*, and T may be much smaller than T*.
          ex = merge(put*ex - site(i, 1)*site(i, 2), t(i, 1) + free*cx, out)
          ey = merge(put*ey - site(i, 1)*site(i, 3), t(i, 2) + free*cy, out)
          missed_x = missed_x + free*(ex - t(i, 1))

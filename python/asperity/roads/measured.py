@@ -381,7 +381,8 @@ def _edge_note(height: FloatArray) -> str:
         return ("the file does not say that the line is periodic, but its ends fit"
                 if line else
                 "the file does not say that the map is periodic: the boundary is taken as free,"
-                " although opposite edges fit")
+                " although opposite edges fit; asperity.surface.save(..., boundary='periodic')"
+                " in Python declares it periodic")
     return ("the ends of the line do not fit, and a line needs a periodic boundary:"
             " periodic = 'tukey' (--periodic) makes them fit"
             if line else

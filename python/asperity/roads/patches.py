@@ -19,7 +19,7 @@ from ..base.check import choice, positive, whole
 from .joins import JOINS, join, margin_of
 from .measured import MeasuredSurface, step_in_words
 from .outliers import find_outliers
-from .spectra import Spectrum, join_spectra, spectrum_of_map
+from .spectra import Spectrum, join_spectra, name_of_several, spectrum_of_map
 
 __all__ = ["DrawnRoad", "MeasuredRoad", "Patch", "low_pass", "rested"]
 
@@ -319,8 +319,7 @@ class MeasuredRoad:
     @property
     def name(self) -> str:
         """Name of the road."""
-        return " and ".join(dict.fromkeys(str(one.source.get("name", "map"))
-                                          for one in self._maps))
+        return name_of_several(str(one.source.get("name", "map")) for one in self._maps)
 
     def patch(self, number: int) -> Patch:
         """Return a patch.

@@ -7,7 +7,7 @@ C(q) is Phi/(4 pi^2). Between its knots a spectrum is a power law, a straight li
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,13 +17,15 @@ from ..base.check import array_of, positive
 from .mode_cells import mean_densities
 from .profile_fit import isotropic_fit
 
-__all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "spectrum_of_map"]
+__all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "name_of_several",
+           "spectrum_of_map"]
 
 FloatArray = NDArray[np.float64]
 
 _PER_DECADE = 20        # bands of a measured spectrum per decade
 _WAVES_IN_MAP = 3.0     # periods within the map of the longest wave that a scan measures reliably
 _CELLS_IN_WAVE = 6.0    # cells within the shortest such wave
+_LONGEST_NAME = 120     # characters of the name of several roads
 _ROUND_OFF = 1e-16      # share of the largest density times k^2 below which a density is round-off
 
 
@@ -352,7 +354,17 @@ def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectr
     # knots closer than 1e-6 are one
     apart = np.concatenate([[True], np.diff(np.log(knots)) > 1e-6])
     return Spectrum(knots[apart], (total / weight)[apart],
-                    name or " and ".join(one.name for one in spectra), notes)
+                    name or name_of_several(one.name for one in spectra), notes)
+
+
+def name_of_several(names: Iterable[str]) -> str:
+    """Return one name for several roads; the title of a case holds 256 characters."""
+    different = list(dict.fromkeys(names))
+    joined = " and ".join(different)
+    if len(joined) <= _LONGEST_NAME:
+        return joined
+    return f"{different[0]:.{_LONGEST_NAME}}" + (
+        f" and {len(different) - 1} others" if len(different) > 1 else "")
 
 
 def _levelled(height: FloatArray) -> FloatArray:

@@ -28,6 +28,8 @@ __all__ = ["DmaFit", "check_shifts", "fit_dma"]
 
 FloatArray = NDArray[np.float64]
 
+_POOR = 0.2         # rms of log10(fit/data) above which a fit is warned of
+
 
 @dataclass(frozen=True)
 class DmaFit:
@@ -292,6 +294,10 @@ def fit_dma(
     errors = [np.log10(modulus.real / storage), np.log10(modulus.imag / loss)]
     errors.append(errors[1] - errors[0])
     rms = [float(np.sqrt(np.mean(error**2))) for error in errors]
+    if max(rms[:2]) > _POOR:
+        notes.append(f"the fit misses the data by a factor of {10.0 ** max(rms[:2]):.2g} (rms):"
+                     " look whether storage and loss are in the right columns; if they are, more"
+                     " arms may help")
     return DmaFit(
         material, omega, storage, loss,
         temperature=None if table.temperature is None else table.temperature[order],
