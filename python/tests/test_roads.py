@@ -274,20 +274,42 @@ def test_short_profiles_have_the_slope_of_their_road_on_average(count, within, h
 
 
 def test_a_profile_without_short_waves_has_a_spectrum():
-    """Powers that fall by many decades, as after a filter, end the fit without a warning."""
+    """Powers that fall by many decades, as after a filter, end the spectrum without a warning."""
     line = np.cos(2 * np.pi * np.arange(512) / 512 * 9) + np.cos(2 * np.pi * np.arange(512) / 37)
     found = spectrum_of_map(line[None, :], 1.0, 1 / 512)
-    assert np.isfinite(found.psd).all() and found.psd[-1] < 1e-6 * found.psd.max()
-    # Between the waves of a periodic profile there is nothing, and the road has no more height.
+    assert np.isfinite(found.psd).all() and 1 / 17 < found.band[1] < 1 / 14
+    # Between the waves of a periodic profile there is nothing. Single waves are improbable for a
+    # random road, but height and slope stay near those of the profile.
     waves = (9, 14, 40)
     line = sum(np.cos(2 * np.pi * np.arange(512) / 512 * wave) for wave in waves)
     found = spectrum_of_map(line[None, :], 1.0, 1 / 512, periodic=True)
-    k = np.geomspace(*found.wavenumber[[0, -1]], 2000)
-    variance = np.trapezoid(found.at(k) * k, k) / (2 * np.pi)
-    assert variance == pytest.approx(np.var(line), rel=0.3)
+    height, slope = theory.psd_moments(found.wavenumber, found.psd)
+    assert height == pytest.approx(np.std(line), rel=0.4)
+    assert slope == pytest.approx(2 * np.pi * np.linalg.norm(waves), rel=0.2)
     once = np.cos(2 * np.pi * np.arange(512) / 512 * 9)[None, :]
     with pytest.raises(ValueError, match="roughness of a single wavelength, or of none, between"):
         spectrum_of_map(once, 1.0, 1 / 512, periodic=True)
+
+
+@pytest.mark.parametrize("count", [512, 1024])
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+@pytest.mark.parametrize("cells", [8, 10, 20])
+def test_waves_that_end_within_the_measured_band(cells, noise, count):
+    """A spectrum without a jump overshot before a sharp end: the slope was up to 16 % too large."""
+    random = np.random.default_rng(2)
+    spectrum = Spectrum(*theory.self_affine_psd(0.7, 1 / 8, 1 / 8, cells / 1024, rms_height=1e-5))
+    height = spectrum.draw(1024, 1024, 1.0, 1.0, 1)
+    height = height + noise * 1e-5 * random.standard_normal(height.shape)
+    true = theory.psd_moments(spectrum.wavenumber, spectrum.psd)[1]
+    slopes = []
+    for row in range(0, 1024, 128):
+        found = spectrum_of_map(height[row : row + 1, :count], count / 1024, 1 / 1024)
+        wave = 2 * np.pi / (cells / 1024)
+        assert found.band[1] == pytest.approx(cells / 1024, rel=0.1)
+        assert "has no waves shorter than" in found.notes[0]
+        assert found.at(np.array([1.2 * wave])) == 0.0
+        slopes.append(theory.psd_moments(found.wavenumber, found.psd)[1])
+    assert np.sqrt(np.mean(np.square(slopes))) == pytest.approx(true, rel=0.08)
 
 
 def test_profiles_of_a_map_have_its_spectrum():

@@ -241,11 +241,14 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
         rough = np.flatnonzero(inside & (slope > least))
         if rough.size < 2:
             raise _too_few(int(np.count_nonzero(inside)), lx, lx / nx, name)
-        # Smooth modes between rough ones count, too: the road has nothing there.
-        kept = slice(rough[0], rough[-1] + 1)
+        # Smooth modes after the first rough one count, too: the road has nothing there.
+        kept = slice(rough[0], np.flatnonzero(inside)[-1] + 1)
         k = kx[kept]
-        return Spectrum(*isotropic_fit(k, np.maximum(density[kept], least / k**2), not periodic),
-                        name)
+        road, psd = isotropic_fit(k, np.maximum(density[kept], least / k**2), not periodic)
+        notes = [] if road[-1] > 0.99 * k[-1] else [
+            f"{name}: has no waves shorter than {2.0 * math.pi / road[-1]:.3g} m, although those"
+            f" down to {2.0 * math.pi / k[-1]:.3g} m were measured"]
+        return Spectrum(road, psd, name, notes)
     ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
     k = np.hypot(kx, ky[:, None]).ravel()[1:]
     k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny), name)
