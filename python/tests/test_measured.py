@@ -454,6 +454,51 @@ def test_levelling(tmp_path):
     assert not any("tilt" in note for note in load(tmp_path / "plane.nc", level="tilt").notes)
 
 
+def test_a_map_can_be_declared_periodic(tmp_path):
+    """A text file cannot say that its map is periodic."""
+    x, y = np.arange(48) / 48, np.arange(32)[:, None] / 32
+    wave = np.cos(2 * np.pi * (2 * x + y)) + np.sin(6 * np.pi * y)
+    np.savetxt(tmp_path / "map.txt", wave)
+    options = {"unit": "um", "size": (48.0, 32.0), "periodic": "as-is"}
+    surface = load(tmp_path / "map.txt", **options)
+    assert surface.periodic and not surface.notes
+    assert "declared periodic as it is" in surface.summary()
+    np.testing.assert_allclose(surface.height, 1e-6 * wave, atol=1e-18)
+    assert not load(tmp_path / "map.txt", **options, crop=(0, 20, 0, 32)).periodic
+    np.savetxt(tmp_path / "ramp.txt", wave + 3 * y)
+    surface = load(tmp_path / "ramp.txt", **options)
+    assert surface.periodic and "opposite edges do not fit" in surface.notes[-1]
+    with pytest.raises(ValueError, match="restore_rms: needs periodic = 'tukey' or 'hann'"):
+        load(tmp_path / "map.txt", **options, restore_rms=True)
+
+
+def test_esri_grids(tmp_path):
+    """The first row of such a grid is the northern one, and the value of NODATA is no height."""
+    height = np.random.default_rng(3).normal(size=(6, 9))
+    rows = height[::-1].copy()
+    rows[1, 4] = -9999.0
+    body = "\n".join(" ".join(f"{value:.9g}" for value in row) for row in rows)
+    for head in ("ncols 9\nnrows 6\nxllcorner 10\nyllcorner 20\ncellsize 5\n"
+                 "NODATA_value -9999\n",
+                 "NCOLS 9\r\nNROWS 6\r\nXLLCENTER 0\r\nYLLCENTER 0\r\nDX 5\r\nDY 5\r\n"):
+        (tmp_path / "map.asc").write_text(head + body + "\n")
+        found = load(tmp_path / "map.asc", unit="um", level="none")
+        assert (found.lx, found.ly) == (45e-6, 30e-6)
+        known = np.ones((6, 9), dtype=bool)
+        known[4, 4] = False
+        np.testing.assert_allclose(found.height[known], 1e-6 * height[known], rtol=1e-8)
+        assert np.abs(found.height).max() < 1e-5
+    (tmp_path / "map.asc").write_text(head + body[:-20] + "\n")
+    with pytest.raises(ValueError, match="heights: must have 54, because ncols = 9 and nrows = 6"):
+        load(tmp_path / "map.asc", unit="um")
+    (tmp_path / "map.asc").write_text(head.replace("DX 5", "DX 0") + body)
+    with pytest.raises(ValueError, match="must give ncols, nrows and cellsize, all positive"):
+        load(tmp_path / "map.asc", unit="um")
+    (tmp_path / "map.asc").write_text(head + body.replace("-9999", "gap"))
+    with pytest.raises(ValueError, match=r"map.asc: a height is no number .*'gap'"):
+        load(tmp_path / "map.asc", unit="um")
+
+
 def test_a_periodic_map_without_its_plane_is_not_periodic(tmp_path):
     """The plane differs at opposite edges: a note gives the jump, and the mean is harmless."""
     j, i = np.mgrid[0:NY, 0:NX]

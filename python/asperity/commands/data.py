@@ -54,8 +54,9 @@ def add_import(verbs: Any) -> None:
                         help="multiply the heights by this factor")
     parser.add_argument("--resample", nargs="+", type=int, metavar=("NX", "NY"),
                         help="divide the same lengths into other cells; only NX for a line scan")
-    parser.add_argument("--periodic", nargs="?", const="tukey", choices=("tukey", "hann"),
-                        help="bring the edges to the mean height by a window (default: tukey)")
+    parser.add_argument("--periodic", nargs="?", const="tukey", choices=("tukey", "hann", "as-is"),
+                        help="bring the edges to the mean height by a window (default: tukey);"
+                             " as-is: opposite edges match, although the file does not say so")
     parser.add_argument("--taper", type=float, metavar="SHARE",
                         help="share of each length that the Tukey window tapers (default: 0.2)")
     parser.add_argument("--restore-rms", action="store_true",

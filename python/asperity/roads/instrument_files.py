@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..base.check import choice, positive
 from ..base.tables import text_of
+from .grid_files import esri_grid
 from .map_files import own_map, text_map, text_table, unit_of_dataset
 from .text_repair import repaired_matrix, with_height
 
@@ -83,8 +84,9 @@ def _open(path: Path) -> Any:
         raise OSError(f"{path}: is a folder, not a file")
     if not path.stat().st_size:
         raise OSError(f"{path}: is empty")
-    if (own := own_map(path)) is not None:
-        return own
+    for reader_of in (own_map, esri_grid):
+        if (reader := reader_of(path)) is not None:
+            return reader
     try:
         with _quiet():
             reader = open_topography(_readable(path))

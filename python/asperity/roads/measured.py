@@ -29,6 +29,7 @@ FloatArray = NDArray[np.float64]
 
 LEVELS = ("none", "mean", "tilt", "curvature")
 WINDOWS = ("hann", "tukey")
+_AS_IS = "as-is"        # of `periodic`: opposite edges match already
 
 # Opposite edges fit if the mean square of their steps is at most this multiple of that inside.
 _SIMILAR = 4.0
@@ -219,7 +220,8 @@ def load(
         Number of cells to which the same lengths are divided: means over the new cells if there are
         fewer, cubic splines if there are more. Only nx for a line scan.
     periodic : str, optional
-        Window that brings the edges to the mean height, 'hann' or 'tukey'.
+        Window that brings the edges to the mean height, 'hann' or 'tukey'; or 'as-is' for a map
+        whose opposite edges match, if the file does not say so.
     taper : float, optional
         Share of each length that a 'tukey' window tapers, half of it at each edge: 0 to 1, 0.2 by
         default.
@@ -253,17 +255,12 @@ def load(
     number("scale", scale)
     if scale == 0.0:
         raise ValueError("scale = 0: must not be 0")
-    if taper is not None:
-        number("taper", taper, 0.0, 1.0, low_open=True)
-    if periodic is not None:
-        choice("periodic", periodic, WINDOWS)
-    elif restore_rms:
-        raise ValueError("restore_rms: needs periodic")
-    if taper is not None and periodic != "tukey":
-        raise ValueError("taper: needs periodic = 'tukey'")
+    _check_window(periodic, taper, restore_rms)
     path = Path(path)
     height, sizes, is_periodic, unit, source = read_map(path, channel, unit, size, transpose)
-    work = MapWork(height, sizes, is_periodic)
+    work = MapWork(height, sizes, is_periodic or periodic == _AS_IS)
+    if periodic == _AS_IS:
+        work.note("periodic")
     if transpose and height.shape[0] > 1:
         work.note("transpose")
     if crop is not None:
@@ -279,7 +276,7 @@ def load(
         work.note("scale", factor=float(scale))
     if resample is not None:
         work.resample(resample)
-    if periodic is not None:
+    if periodic in WINDOWS:
         share = 0.2 if taper is None else float(taper)
         work.window(periodic, 1.0 if periodic == "hann" else share, restore_rms)
     if unit != "m":
@@ -289,6 +286,18 @@ def load(
     lx, ly = (float(f"{to_metres(length, unit):.12g}") for length in work.sizes)
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
                            [*_jump_note(jump, level, unit, work.periodic), *_advice(work, level)])
+
+
+def _check_window(periodic: str | None, taper: float | None, restore_rms: bool) -> None:
+    """Refuse options of the window that are not allowed, or that need another one."""
+    if periodic is not None:
+        choice("periodic", periodic, (*WINDOWS, _AS_IS))
+    if restore_rms and periodic not in WINDOWS:
+        raise ValueError("restore_rms: needs periodic = 'tukey' or 'hann'")
+    if taper is not None:
+        number("taper", taper, 0.0, 1.0, low_open=True)
+        if periodic != "tukey":
+            raise ValueError("taper: needs periodic = 'tukey'")
 
 
 def import_topography(
@@ -325,6 +334,7 @@ def import_topography(
 def step_in_words(step: dict[str, Any]) -> str:
     """Return the description of a step."""
     words: dict[str, Callable[[dict[str, Any]], str]] = {
+        "periodic": lambda s: "declared periodic as it is",
         "transpose": lambda s: "transposed: the file's first index runs along y",
         "crop": lambda s: f"cropped to {s['nx']} x {s['ny']} cells: "
                           + ", ".join(f"{value:.6g}" for value in s["kept"]),
@@ -371,6 +381,8 @@ def _advice(work: MapWork, level: str) -> list[str]:
         notes.append("the map is flat")
     if not work.periodic:
         notes.append(_edge_note(work.height))
+    elif any(step["step"] == "periodic" for step in work.steps) and not _edges_fit(work.height):
+        notes.append("the map is declared periodic, but opposite edges do not fit")
     return notes
 
 
@@ -381,8 +393,8 @@ def _edge_note(height: FloatArray) -> str:
         return ("the file does not say that the line is periodic, but its ends fit"
                 if line else
                 "the file does not say that the map is periodic: the boundary is taken as free,"
-                " although opposite edges fit; asperity.surface.save(..., boundary='periodic')"
-                " in Python declares it periodic")
+                " although opposite edges fit; periodic = 'as-is' (--periodic as-is) declares it"
+                " periodic")
     return ("the ends of the line do not fit, and a line needs a periodic boundary:"
             " periodic = 'tukey' (--periodic) makes them fit"
             if line else

@@ -282,22 +282,14 @@ def fit_dma(
     notes += _range_notes(table, omega)
     material = Prony.fit(omega, storage, loss, arms_per_decade=arms_per_decade, slack=slack,
                          least_plateau=least_plateau)
-    if omega.size < material.g.size:
-        notes.append(f"{omega.size} points for {material.g.size} arms: the series between them is a"
-                     " guess")
     floor = least_plateau * float(storage.min())
     bounded = material.g_inf <= floor * (1.0 + 1e-9)
-    if bounded:
-        notes.append("the data do not show the plateau: it is held at"
-                     f" {100 * least_plateau:g} % of the lowest storage modulus")
     modulus = material.complex_modulus(omega)
     errors = [np.log10(modulus.real / storage), np.log10(modulus.imag / loss)]
     errors.append(errors[1] - errors[0])
     rms = [float(np.sqrt(np.mean(error**2))) for error in errors]
-    if max(rms[:2]) > _POOR:
-        notes.append(f"the fit misses the data by a factor of {10.0 ** max(rms[:2]):.2g} (rms):"
-                     " look whether storage and loss are in the right columns; if they are, more"
-                     " arms may help")
+    notes += _fit_notes(omega.size, material.g.size, max(rms[:2]),
+                        least_plateau if bounded else None)
     return DmaFit(
         material, omega, storage, loss,
         temperature=None if table.temperature is None else table.temperature[order],
@@ -309,6 +301,20 @@ def fit_dma(
         plateau_bounded=bounded, name=table.name, notes=notes,
         vertical_shifts=([(t, float(found.log_vertical[rows[0]])) for t, rows in sweeps]
                          if vertical else []))
+
+
+def _fit_notes(points: int, arms: int, rms: float, held_at: float | None) -> list[str]:
+    """Return notes on a fit with an rms error of log10, and perhaps with its plateau held."""
+    notes = []
+    if points < arms:
+        notes.append(f"{points} points for {arms} arms: the series between them is a guess")
+    if held_at is not None:
+        notes.append("the data do not show the plateau: it is held at"
+                     f" {100 * held_at:g} % of the lowest storage modulus")
+    if rms > _POOR:
+        notes.append(f"the fit misses the data by a factor of {10.0**rms:.2g} (rms): look whether"
+                     " storage and loss are in the right columns; if they are, more arms may help")
+    return notes
 
 
 class _Shifted(NamedTuple):
