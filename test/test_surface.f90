@@ -546,40 +546,40 @@ contains
       term%wavelength_long = 0.5_dp
       term%wavelength_rolloff = 0.5_dp
       term%wavelength_short = 0.25_dp
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'eight cells per wave and four waves per side: no warning')
       term%wavelength_short = 0.2_dp
       term%wavelength_long = 2.0_dp
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 2, 'two warnings')
       call check_order(index(warnings(1), 'wavelength_long = 2 m'), '>', 0, &
          'waves as long as the side')
       call check_order(index(warnings(2), '6.4 cells'), '>', 0, 'few cells per wave')
       term%wavelength_long = 0.5_dp
       term%wavelength_short = 0.05_dp
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 1, 'one warning')
       call check_order(index(warnings(1), 'Nyquist'), '>', 0, 'below the Nyquist wavelength')
 
       term = default_surface(grid)
       term%shape = 'sine'
       term%wavelength = 0.5_dp
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'four waves: no warning')
       term%wavelength = 0.6_dp
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 1 .and. index(warnings(1), '3.3333') > 0, 'a broken wave')
       grid%boundary = boundary_free
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'a free map may contain a part of a wave')
 
       grid = new_grid(128, 74, 2.0_dp, 2.0_dp/sqrt(3.0_dp), boundary_periodic)
       term%shape = 'hexagonal_wave'
       term%wavelength = 1.0_dp
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'a hexagonal wave in a cell of its period: no warning')
       grid = new_grid(128, 128, 2.0_dp, 2.0_dp, boundary_periodic)
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 1 .and. index(warnings(1), 'ly') > 0, &
          'a hexagonal wave on a square')
    end subroutine warnings_name_what_is_doubtful
@@ -609,7 +609,7 @@ contains
       call file%write_attribute('/grid', 'boundary', 'free', error)
       call check_no_error(error, 'a map with attributes')
       call file%close(error)
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 3, 'there are warnings of size, unit and edges')
       call check_that(index(warnings(1), '&surface: file = ''told_map.h5'': according to the file '// &
          'the map is 0.25 m by 0.6 m, but the grid is 0.5 m by') == 1, 'another length')
@@ -618,11 +618,11 @@ contains
       call map_in_another_dataset(grid, term)
       term%scale = 1.0e-6_dp
       grid = new_grid(5, 3, 0.25_dp, 0.6_dp, boundary_free)
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'the same size, a scale, a free boundary: no warning')
       open (newunit=unit, file=path, status='old')
       close (unit, status='delete')
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'a missing file is an error elsewhere')
    end subroutine map_that_contradicts_the_case
 
@@ -644,11 +644,11 @@ contains
       call file%close(error)
       other = term
       other%file = path
-      call find_warnings(grid, [other], warnings)
+      call find_warnings(grid, [other], 0.0_dp, warnings)
       call check_that(size(warnings) == 1, 'one warning about the dataset ''surface''')
       call check_order(index(warnings(1), 'the unit of the map is nm'), '>', 0, 'unit of ''surface''')
       other%dataset = 'level'
-      call find_warnings(grid, [other], warnings)
+      call find_warnings(grid, [other], 0.0_dp, warnings)
       call check_that(size(warnings) == 1, 'one warning about a dataset that is named')
       call check_order(index(warnings(1), 'the unit of the map is mm'), '>', 0, 'unit of the dataset that is named')
       open (newunit=unit, file=path, status='old')
@@ -681,15 +681,20 @@ contains
          call check_no_error(error, 'a steep map')
          call file%close(error)
          deallocate (map)
-         call find_warnings(grid, [term], warnings)
+         call find_warnings(grid, [term], 0.0_dp, warnings)
          call check_that(size(warnings) == 1, 'a steep map causes a warning')
          call check_order(index(warnings(1), 'the slope of the map is about 5, but'), '>', 0, trim(warnings(1)))
          term%scale = -0.59_dp
-         call find_warnings(grid, [term], warnings)
+         call find_warnings(grid, [term], 0.0_dp, warnings)
          call check_that(size(warnings) == 0, 'a slope of 2.95 after scaling: no warning')
+         call find_warnings(grid, [term], 0.13_dp, warnings)
+         call check_that(size(warnings) == 0, 'friction does not wedge at 0.13 times 2.95')
+         call find_warnings(grid, [term], 0.2_dp, warnings)
+         call check_that(size(warnings) == 1, 'friction may wedge at 0.2 times 2.95')
+         call check_order(index(warnings(1), 'of about 2.95 times the coefficient is 0.59'), '>', 0, trim(warnings(1)))
       end do
       grid = new_grid(6, 4, 2.0_dp, 3.0_dp, boundary_free)
-      call find_warnings(grid, [term], warnings)
+      call find_warnings(grid, [term], 0.0_dp, warnings)
       call check_that(size(warnings) == 0, 'a map of another shape is an error elsewhere')
       open (newunit=unit, file=path, status='old')
       close (unit, status='delete')

@@ -93,7 +93,7 @@ contains
       term(1)%shape = 'self_affine'
       term(1)%wavelength_long = wavelength_long
       term(1)%wavelength_short = wavelength_short
-      call find_warnings(grid, term, found)
+      call find_warnings(grid, term, 0.0_dp, found)
       warnings = ''
       do i = 1, size(found)
          warnings = trim(warnings)//new_line('a')//found(i)

@@ -106,9 +106,12 @@ contains
    subroutine add_warnings(case)
       type(case_type), intent(inout) :: case
       character(warning_length), allocatable :: found(:)
+      real(dp) :: mu
       integer :: i
 
-      call find_warnings(case%grid, case%surfaces, found)
+      mu = 0.0_dp
+      if (case%friction%law == 'coulomb' .and. case%friction%slope_effect) mu = case%friction%coefficient
+      call find_warnings(case%grid, case%surfaces, mu, found)
       do i = 1, size(found)
          call add_warning(case, trim(found(i)))
       end do

@@ -1,7 +1,7 @@
 !> Warnings about a surface that is allowed but doubtful: a random surface with wavelengths that its
 !> grid does not hold (thesis, 4.1), waves that do not close on the period of the grid, waves with
-!> too few cells, and height maps that are very steep or whose files state another size, unit or boundary than the
-!> input.
+!> too few cells, height maps that are very steep or whose files state another size, unit or boundary than the
+!> input, and rough roads so steep that friction may wedge.
 module surface_warnings
    use asperity_errors, only : error_type
    use asperity_parallel, only : is_first_process
@@ -21,6 +21,9 @@ module surface_warnings
 
    integer, parameter, public :: warning_length = 400
    real(dp), parameter, public :: largest_slope = 3.0_dp   !! far beyond what a theory for small slopes describes
+   !> Rms slope times coefficient from which rows with friction were seen to fail in trials on self-affine roads: up to
+   !> 0.3 all of them were solved, at 0.4 a part, and from 0.5 on none.
+   real(dp), parameter :: wedging = 0.4_dp
    real(dp), parameter :: cells_per_wave = 8.0_dp      !! enough for contact areas of some percent
    real(dp), parameter :: round_off = 1.0e-9_dp
    integer, parameter :: most_slabs = 64               !! of a map, from which its slope is estimated: 64 MiB
@@ -29,9 +32,10 @@ module surface_warnings
 contains
 
    !> One warning, with its numbers, for each thing that is doubtful; none if all is well.
-   subroutine find_warnings(grid, terms, warnings)
+   subroutine find_warnings(grid, terms, mu, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: terms(:)      !! checked
+      real(dp), intent(in) :: mu                               !! coefficient of friction on slopes; 0 without
       character(warning_length), allocatable, intent(out) :: warnings(:)
       integer :: n
 
@@ -42,8 +46,9 @@ contains
             call check_long_waves(grid, terms(n), warnings)
             call check_short_waves(grid, 'wavelength_short', terms(n)%wavelength_short, 1.0_dp, &
                .false., warnings)
+            call check_wedging('&surface: ''self_affine'': ', terms(n)%rms_slope, mu, warnings)
          case ('file')
-            call check_map(grid, terms(n), warnings)
+            call check_map(grid, terms(n), mu, warnings)
          case default
             call check_wave(grid, terms(n), warnings)
          end select
@@ -70,9 +75,10 @@ contains
    !> The slope of a map must be moderate, and the lengths, the unit and the boundary that its file states must agree
    !> with the input. No warning is given about a file that states none of them, or that cannot be read: reading the
    !> map itself reports that as an error. Only the first process opens files.
-   subroutine check_map(grid, term, warnings)
+   subroutine check_map(grid, term, mu, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
+      real(dp), intent(in) :: mu                  !! coefficient of friction on slopes; 0 without
       character(warning_length), allocatable, intent(inout) :: warnings(:)
       type(hdf5_file_type) :: file
       type(error_type), allocatable :: error
@@ -107,7 +113,7 @@ contains
          end if
       end if
       call file%close(error)
-      call check_slope(grid, term, map, start, warnings)
+      call check_slope(grid, term, map, start, mu, warnings)
    end subroutine check_map
 
    !> The dataset with the map of a term.
@@ -142,12 +148,13 @@ contains
       call append(warnings, text)
    end subroutine check_unit
 
-   !> The heights of a map in another unit make it far too steep.
-   subroutine check_slope(grid, term, map, start, warnings)
+   !> The heights of a map in another unit make it far too steep. Friction may wedge on a less steep one.
+   subroutine check_slope(grid, term, map, start, mu, warnings)
       type(grid_type), intent(in) :: grid
       type(surface_settings_type), intent(in) :: term
       character(*), intent(in) :: map             !! the dataset
       character(*), intent(in) :: start           !! of the warning
+      real(dp), intent(in) :: mu                  !! coefficient of friction on slopes; 0 without
       character(warning_length), allocatable, intent(inout) :: warnings(:)
       type(error_type), allocatable :: error
       type(trial_type) :: trial
@@ -163,12 +170,31 @@ contains
       call trial%verdict(trim(term%file), error)
       if (allocated(error)) return
       call estimate_slope(grid, term, map, slope)
-      if (.not. slope > largest_slope) return
+      if (.not. slope > largest_slope) then
+         call check_wedging(start, slope, mu, warnings)
+         return
+      end if
       text = start//'the slope of the map is about '//rounded_text(slope, 3)// &
          ', but the solid is linear and its surface flat, which holds for small slopes only: check the unit of the '// &
          'heights, which are read as metres times scale, and lx and ly'
       call append(warnings, text)
    end subroutine check_slope
+
+   !> On slopes above 1/mu friction can hold any force uphill. If much of a rough road is so steep, rows of a slide may
+   !> have no solution.
+   subroutine check_wedging(start, slope, mu, warnings)
+      character(*), intent(in) :: start           !! of the warning
+      real(dp), intent(in) :: slope               !! rms
+      real(dp), intent(in) :: mu                  !! coefficient of friction on slopes; 0 without
+      character(warning_length), allocatable, intent(inout) :: warnings(:)
+      character(warning_length) :: text
+
+      if (.not. mu*slope > wedging) return
+      text = start//'the rms slope of about '//rounded_text(slope, 3)//' times the coefficient is '// &
+         rounded_text(mu*slope, 2)//': above about 0.4 much of the road is steeper than 1/coefficient, where '// &
+         'friction can hold any force uphill; rows of a slide may take very many passes, or end unsolved (status 4)'
+      call append(warnings, text)
+   end subroutine check_wedging
 
    !> The rms slope of a map on the grid, from slabs of rows that are spread over it. It is 0 if the map cannot be read
    !> or has another shape than the grid.
