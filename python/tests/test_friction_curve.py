@@ -926,6 +926,8 @@ def test_rubber_of_several_kinds(tmp_path):
      "outliers: is for measured maps and profiles only"),
     ([ROAD, "--material", "r.nml", "--side", "1e-2", "--short", "1e-4"],
      "short = 0.00025: must be at least two"),
+    ([ROAD, "--material", "r.nml", "--short", "20"],
+     "short = 20: must be below the side of a patch, 0.002 m: longer waves leave it flat"),
     ([ROAD, ROAD, "--material", "r.nml"], "is given twice"),
     ([ROAD, "--material", "r.nml", "--extend", "1"],
      "extend = 1: must be shorter than the shortest wave of the spectrum of the road, 0.00025 m"),

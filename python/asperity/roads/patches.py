@@ -177,11 +177,14 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
                            one.source, one.notes), notes
 
 
-def _check_cells(short: float, cell: float) -> None:
-    """Refuse waves that the cells cannot represent."""
+def _check_short(short: float, cell: float, side: float) -> None:
+    """Refuse a shortest wave that the cells cannot represent, or that leaves no waves in a patch."""
     if short < (2.0 - 1e-9) * cell:
         raise ValueError(f"short = {short:.4g}: must be at least two cells, {2.0 * cell:.4g} m:"
                          " shorter waves need smaller cells")
+    if not short < side:
+        raise ValueError(f"short = {short:.4g}: must be below the side of a patch, {side:.4g} m:"
+                         " longer waves leave it flat (the unit is m)")
 
 
 class DrawnRoad:
@@ -224,7 +227,7 @@ class DrawnRoad:
                              f" {self.side:.4g} m and waves up to {longest:.4g} m: the shortest"
                              " wave of a drawn map has eight cells")
         self.short = max(least if short is None else positive("short", short), spectrum.band[1])
-        _check_cells(self.short, self.side / cells)
+        _check_short(self.short, self.side / cells, math.inf if short is None else self.side)
         self.spectrum = spectrum.cut(self.side, self.short)
         self.seed = seed
         self.notes = list(spectrum.notes)
@@ -311,7 +314,9 @@ class MeasuredRoad:
         steps = [max(one.lx / one.height.shape[1], one.ly / one.height.shape[0]) for one in maps]
         least = _CELLS_IN_MEASURED_WAVE * max(steps)
         self.short = least if short is None else positive("short", short)
-        _check_cells(self.short, max(steps))
+        sides = [length * min(1.0, self.cells / count) for one in maps
+                 for length, count in ((one.lx, one.height.shape[1]), (one.ly, one.height.shape[0]))]
+        _check_short(self.short, max(steps), min(sides))
         self.whole_spectrum = join_spectra([
             spectrum_of_map(one.height, one.lx, one.ly, periodic=one.periodic,
                             name=one.source.get("name", "map")) for one in self._maps])
