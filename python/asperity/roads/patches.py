@@ -178,7 +178,7 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
 
 
 def _check_short(short: float, cell: float, side: float) -> None:
-    """Refuse a shortest wave that the cells cannot represent, or that leaves no waves in a patch."""
+    """Refuse a shortest wave that cells cannot represent, or that leaves a patch flat."""
     if short < (2.0 - 1e-9) * cell:
         raise ValueError(f"short = {short:.4g}: must be at least two cells, {2.0 * cell:.4g} m:"
                          " shorter waves need smaller cells")
@@ -314,9 +314,9 @@ class MeasuredRoad:
         steps = [max(one.lx / one.height.shape[1], one.ly / one.height.shape[0]) for one in maps]
         least = _CELLS_IN_MEASURED_WAVE * max(steps)
         self.short = least if short is None else positive("short", short)
-        sides = [length * min(1.0, self.cells / count) for one in maps
-                 for length, count in ((one.lx, one.height.shape[1]), (one.ly, one.height.shape[0]))]
-        _check_short(self.short, max(steps), min(sides))
+        side = min(length * min(1.0, self.cells / count) for one in maps
+                   for length, count in zip((one.ly, one.lx), one.height.shape, strict=True))
+        _check_short(self.short, max(steps), side)
         self.whole_spectrum = join_spectra([
             spectrum_of_map(one.height, one.lx, one.ly, periodic=one.periodic,
                             name=one.source.get("name", "map")) for one in self._maps])
