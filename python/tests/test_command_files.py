@@ -86,7 +86,7 @@ def test_completion_in_bash(program, tmp_path):
     assert completed(program, tmp_path, "import", "--level", "") == {"none", "mean", "tilt",
                                                                      "curvature"}
     assert completed(program, tmp_path, "friction", "--join", "m") == {"mirror"}
-    assert completed(program, tmp_path, "import", "--periodic", "") == {"tukey", "hann"}
+    assert completed(program, tmp_path, "import", "--periodic", "") == {"as-is", "hann", "tukey"}
     assert completed(program, tmp_path, "plot", "road.h5", "--field", "g") == {"gap"}
     assert completed(program, tmp_path, "plot", "road.h5", "--history", "en") == {
         "energy", "energy_elastic", "energy_adhesive", "energy_kinetic", "energy_radiated"}
