@@ -28,6 +28,7 @@ contains
       if (selected('mixing_settles_where_plain_passes_fail')) &
          call mixing_settles_where_plain_passes_fail()
       if (selected('accuracy_follows_the_mismatch')) call accuracy_follows_the_mismatch()
+      if (selected('slow_passes_are_solved_all_at_once')) call slow_passes_are_solved_all_at_once()
       if (selected('edge_cells_are_judged_one_by_one')) call edge_cells_are_judged_one_by_one()
       if (selected('thick_block_on_steep_wave_settles')) call thick_block_on_steep_wave_settles()
       if (selected('steep_road_settles_and_books_close')) call steep_road_settles_and_books_close()
@@ -233,6 +234,34 @@ contains
       call check_that(control%go_back .and. i < 15, 'back to the best place', [real(i, dp)])
       call check_order(control%damping, '<', 0.5_dp, 'shorter steps from there')
    end subroutine accuracy_follows_the_mismatch
+
+   !> A step whose passes are slow is solved all at once after six of them, unless the shares of the cells are unknown.
+   subroutine slow_passes_are_solved_all_at_once()
+      call check_after_six(0.1_dp, sharing=.false., due=.false., thorough=.false., name='three passes more')
+      call check_after_six(0.4_dp, sharing=.false., due=.true., thorough=.false., name='about ten passes more')
+      call check_after_six(0.9_dp, sharing=.false., due=.true., thorough=.true., name='nearly a hundred passes more')
+      call check_after_six(1.5_dp, sharing=.false., due=.true., thorough=.true., name='passes that diverge')
+      call check_after_six(0.9_dp, sharing=.true., due=.false., thorough=.false., name='unknown shares')
+   end subroutine slow_passes_are_solved_all_at_once
+
+   !> Check what follows after six passes with a mismatch that is multiplied by a factor from each to the next.
+   subroutine check_after_six(factor, sharing, due, thorough, name)
+      real(dp), intent(in) :: factor
+      logical, intent(in) :: sharing, due, thorough
+      character(*), intent(in) :: name
+      type(pass_control_type) :: control
+      integer :: i
+
+      call control%start(1.0e-8_dp, 1.0_dp, sharing)
+      do i = 1, 6
+         call control%judge(1.0e-2_dp*factor**(i - 1))
+         if (i < 6) call check_that(.not. control%joint_due, name//': first the passes')
+      end do
+      call check_that(control%joint_due .eqv. due, name//': all at once')
+      call check_that((control%joint_due .and. control%thorough) .eqv. thorough, name//': at any cost')
+      call control%judge(1.0e-2_dp*factor**6)
+      call check_that(.not. control%joint_due, name//': only once')
+   end subroutine check_after_six
 
    !> A steep wave under a block without mass of forty wavelengths, which has been sheared. When the strains
    !> were read one pass behind the contact, it jumped with any number of passes (mean change of the speed

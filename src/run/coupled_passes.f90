@@ -42,10 +42,10 @@
 !> accuracy of the next one and the length of the step, and `choose_place` computes the next place. When the number of
 !> passes is exhausted, the row keeps the result of the last pass; if there were more than ten, the last one is done
 !> at the best place so far. Passes that do not come closer continue with short plain steps (module `pass_control`).
-!> If these do not come closer either, module `joint_step` solves all equations of the step at once, at most once per
-!> row; the next pass is done at its solution, with its shares of the bounds, and verifies it. A normal solve that
-!> does not converge ends the loop. On a stop (module `row_stop`) the loop returns at once, and the caller restores
-!> the state of the row before.
+!> If these do not come closer either, module `joint_step` solves all equations of the step at once. It also does so
+!> after the first few passes, if more than as many again are to be expected. The next pass is done at its solution,
+!> with its shares of the bounds, and verifies it. A normal solve that does not converge ends the loop. On a stop
+!> (module `row_stop`) the loop returns at once, and the caller restores the state of the row before.
 !>
 !> The work of a row is bounded by `most_passes`, by the iterations that a case allows to a normal and to a tangential
 !> solve (`max_iterations`), and by the evaluations that `joint_equations` allows.
@@ -214,7 +214,7 @@ contains
       logical :: solved
       integer :: transforms
 
-      call self%joint%solve(contact, plan, self%place, solved, transforms)
+      call self%joint%solve(contact, plan, self%place, control%thorough, solved, transforms)
       self%gap_known = .false.
       tangential%ffts = tangential%ffts + transforms
       overwritten = transforms > 0

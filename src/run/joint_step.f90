@@ -1,4 +1,4 @@
-!> Solves a step with friction for all unknowns at once, if its passes do not settle.
+!> Solves a step with friction for all unknowns at once, if its passes settle slowly or not at all.
 !>
 !> A pass computes pressure, traction and place one after the other. If the traction of a cell jumps when the
 !> cell opens, the passes oscillate between two states. The equations of module `joint_equations` contain all
@@ -21,6 +21,8 @@ module joint_step
 
    public :: joint_step_type
 
+   integer, parameter :: impatient = 3                 !! steps of Newton's method that must halve the residual
+
    !> The equations and the method. A variable of this type must not be copied.
    type :: joint_step_type
       type(joint_equations_type), private :: equations
@@ -34,11 +36,12 @@ contains
 
    !> Solve a step, starting from the state after the last pass. If the step is solved, the state of the contact,
    !> the trial displacement and the shares of the cells are those of the solution.
-   subroutine solve(self, contact, plan, place, solved, transforms)
+   subroutine solve(self, contact, plan, place, thorough, solved, transforms)
       class(joint_step_type), intent(inout) :: self
       class(contact_type), intent(inout), target :: contact
       type(planned_row_type), intent(in) :: plan
       real(dp), intent(in) :: place(:, :, :)           !! of the last pass, m [nx, 2 or 3, rows]
+      logical, intent(in) :: thorough                  !! Newton's method may take long, and a path may be followed
       logical, intent(out) :: solved
       integer, intent(out) :: transforms               !! number of transforms
 
@@ -52,9 +55,10 @@ contains
          return
       end if
       call self%equations%start(contact, plan, self%newton%now)
+      self%newton%steps_to_halve = merge(0, impatient, thorough)
       call self%newton%solve(self%equations, contact%case%solver%tolerance, solved)
       transforms = 6*self%equations%evaluations
-      if (.not. (solved .or. stop_is_due())) then
+      if (thorough .and. .not. (solved .or. stop_is_due())) then
          call follow(self, contact, plan, place, solved)
          transforms = transforms + 6*self%equations%evaluations
       end if
@@ -73,7 +77,6 @@ contains
       call self%equations%set_origin(place, solved)
       if (.not. solved) return
       call follow_path(self%newton, self%equations, contact%case%solver%tolerance, solved)
-      self%newton%steps_to_halve = 0                   ! the next step is first tried with patience, too
    end subroutine follow
 
    !> Free the operator and the fields.

@@ -21,8 +21,11 @@
 !>   first plain step, or has not been halved in `stalled_plain` passes, the acceleration begins again from the present
 !>   place. The best place before is discarded, because it may belong to the state that ceased to exist.
 !>
-!> If the passes stall even with plain steps, they may never settle. The step should then be solved all at once
-!> (`joint_due`), but at most once per row, because an attempt may cost as much as many passes.
+!> A step may also be solved all at once (`joint_due`), at most twice per row. The first attempt is made after a few
+!> passes (`few`), if more than as many again are to be expected at their present rate. On steep roads it takes far
+!> less time than the passes would. With unknown shares it would often take more, and is not made. The second one is
+!> made, from a better place, if the passes stall even with plain steps, and may then never settle. An attempt that is
+!> `thorough` may cost as much as many passes; the first one is so only if `many` passes are to be expected.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -43,6 +46,9 @@ module pass_control
    real(dp), parameter :: diverged = 10.0_dp        !! a mismatch above this multiple of the least one has diverged
    integer, parameter :: patience = 2               !! passes without success before the fraction is reduced
    integer, parameter :: stalled = 15               !! accelerated passes that must halve the mismatch
+   integer, parameter :: few = 6                    !! passes before the first attempt to solve the step all at once
+   integer, parameter :: rated = 3                  !! last passes of these whose rate counts
+   integer, parameter :: many = 30                  !! passes that cost more than a thorough attempt
 
    ! Plain steps. If the residual keeps its direction, their length and momentum grow; if it turns, both shrink.
    integer, parameter :: stalled_plain = 60         !! plain passes that must halve the mismatch
@@ -65,7 +71,9 @@ module pass_control
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
       logical :: joint_due = .false.                !! the step should be solved all at once
+      logical :: thorough = .false.                 !! this attempt may cost as much as many passes
       real(dp), private :: tolerance = 0.0_dp
+      logical, private :: sharing = .false.         !! the shares of the cells at the edge are unknown, too
       real(dp), private :: fraction = usual_fraction
       logical, private :: may_be_joint = .true.     !! the row may still be solved all at once
       real(dp), private :: slowed = slow_damping    !! damping after slow progress
@@ -77,6 +85,8 @@ module pass_control
       integer, private :: since = 0                 !! passes since the milestone, or since the plain steps began
       integer, private :: seen = 0                  !! passes judged since the start, or since the plain steps ended
       integer, private :: idle = 0                  !! successive passes without success
+      integer, private :: count = 0                 !! passes of the row that were judged
+      real(dp), private :: marked = huge(1.0_dp)    !! least mismatch before the passes whose rate counts
    contains
       procedure :: start
       procedure :: judge
@@ -94,6 +104,7 @@ contains
       !> change their states one after the other, and damping would only delay that.
       logical, intent(in) :: sharing
 
+      self%sharing = sharing
       if (sharing) self%slowed = sharing_damping
       self%tolerance = tolerance
       self%accuracy = min(max(coarsest, tolerance), max(tolerance, usual_fraction*expected))
@@ -106,6 +117,7 @@ contains
       real(dp), intent(in) :: mismatch
 
       self%seen = self%seen + 1
+      self%count = self%count + 1
       self%damping = 1.0_dp
       if (self%seen > 2 .and. mismatch > slow*self%last) self%damping = self%slowed
       self%last = mismatch
@@ -134,12 +146,28 @@ contains
       if (self%plain) then
          self%joint_due = self%since >= stalled_plain .and. self%may_be_joint
          if (self%joint_due) self%may_be_joint = .false.
+         self%thorough = .true.
          if (self%since >= stalled_plain .or. mismatch < recovered*self%plain_start) &
             call end_plain_steps(self, mismatch)
       else if (self%since >= stalled) then
          call begin_plain_steps(self)
       end if
+      if (self%count == few - rated) self%marked = self%least
+      if (self%count == few .and. .not. self%sharing) then
+         self%joint_due = takes_more_than(self, few)
+         self%thorough = takes_more_than(self, many)
+      end if
    end subroutine judge
+
+   !> Are more passes than a number to be expected, at the rate of the last ones?
+   pure logical function takes_more_than(self, passes) result(yes)
+      class(pass_control_type), intent(in) :: self
+      integer, intent(in) :: passes
+      real(dp) :: rate                              !! of the logarithm of the mismatch, per pass
+
+      rate = log(self%marked/self%least)/rated
+      yes = log(self%least/self%tolerance) > passes*rate
+   end function takes_more_than
 
    !> Require the tolerance itself if the next pass would be solved nearly to it. This may save a pass, because the next
    !> one may then be the last.
