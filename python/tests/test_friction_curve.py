@@ -24,11 +24,12 @@ from slurm import HAS_SLURM, Slurm
 import asperity
 from asperity.__main__ import main
 from asperity.curves import CurvePlan, plan_curve, run_curve
+from asperity.curves.gathering import _left_out_note
 from asperity.curves.running import SubmittedError
 from asperity.curves.sources import _road_source, compound_of, road_of
 from asperity.material import WLF, Prony
 from asperity.results.curve_remarks import CurveRemark
-from asperity.results.friction_curve import COLUMNS, interval
+from asperity.results.friction_curve import COLUMNS, _rounded, interval
 from asperity.roads.outliers import find_outliers
 from asperity.rubber.compound import Compound
 from asperity.runs.means import Means
@@ -1232,6 +1233,20 @@ def test_outliers_of_profiles(tmp_path, monkeypatch, capsys):
     assert main(["friction", "dust.h5", "--material", "r.nml", "--cells", "32", "--plan",
                  "--outliers", "remove"]) == 0
     assert "usual: replaced by the median of the neighbours" in capsys.readouterr().out
+
+
+def test_waves_that_are_left_out_are_noted():
+    """On few cells most of the friction may be in waves that the patches do not contain."""
+    friction = np.array([0.1, 0.01, np.nan]).reshape(1, 1, 3, 1)
+    left_out = np.array([0.02, 0.03, 0.5]).reshape(1, 1, 3)
+    (note,) = _left_out_note(friction, left_out)
+    assert "would add up to 0.03 to the friction, where it is 0.01" in note
+    assert not _left_out_note(friction, 0.1 * left_out)
+
+
+def test_small_friction_keeps_its_digits():
+    assert [_rounded(value) for value in (0.12346, -0.0, 3.25e-5, -0.00096)] == [
+        "0.1235", "0.0000", "3.2e-05", "-9.6e-04"]
 
 
 def test_smooth_profiles_have_no_outliers():

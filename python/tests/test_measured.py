@@ -472,6 +472,14 @@ def test_a_map_can_be_declared_periodic(tmp_path):
         load(tmp_path / "map.txt", **options, restore_rms=True)
 
 
+def test_a_wrong_unit_makes_a_road_too_steep(tmp_path):
+    np.savetxt(tmp_path / "map.txt", np.random.default_rng(1).normal(size=(20, 30)))
+    notes = load(tmp_path / "map.txt", unit="m", size=(3e-3, 2e-3)).notes
+    assert any("no road is so steep; often the heights" in note for note in notes)
+    notes = load(tmp_path / "map.txt", unit="um", size=(3e3, 2e3)).notes
+    assert not any("no road is so steep" in note for note in notes)
+
+
 def test_esri_grids(tmp_path):
     """The first row of such a grid is the northern one, and the value of NODATA is no height."""
     height = np.random.default_rng(3).normal(size=(6, 9))

@@ -19,7 +19,7 @@ from asperity.roads.joins import (
 )
 from asperity.roads.measured import MeasuredSurface
 from asperity.roads.outliers import find_outliers
-from asperity.roads.patches import MeasuredRoad, low_pass, rested
+from asperity.roads.patches import DrawnRoad, MeasuredRoad, low_pass, rested
 from asperity.roads.spectra import (
     Spectrum,
     isotropic_of_profile,
@@ -310,6 +310,34 @@ def test_waves_that_end_within_the_measured_band(cells, noise, count):
         assert found.at(np.array([1.2 * wave])) == 0.0
         slopes.append(theory.psd_moments(found.wavenumber, found.psd)[1])
     assert np.sqrt(np.mean(np.square(slopes))) == pytest.approx(true, rel=0.08)
+
+
+def test_a_spectrum_begins_with_the_longest_waves_of_the_road():
+    """A scan measures longer waves than the road may have; drawn maps were then far too large."""
+    random = np.random.default_rng(4)
+    k = 2 * np.pi * np.fft.rfftfreq(2048, 10e-6)
+    inside = (k > 2 * np.pi / 1e-3) & (k < 2 * np.pi / 1e-4)
+    power = np.where(inside, np.where(inside, k, 1.0) ** -1.3, 0.0)
+    line = np.fft.irfft(power * np.fft.rfft(random.standard_normal(2048)))[None, :]
+    found = spectrum_of_map(line, 2048 * 10e-6, 10e-6)
+    assert 0.8e-3 < found.band[0] < 1.4e-3
+    drawn = DrawnRoad(found, 96, seed=1)
+    assert drawn.side == 2 * found.band[0]
+    assert np.std(drawn.patch(0).height) > 0.5 * np.std(line)
+
+
+def test_a_road_with_a_direction_is_noted():
+    """Persson's theory and drawn maps are isotropic."""
+    x = np.arange(64) / 64
+    along = 1e-6 * (np.sin(8 * np.pi * x) + np.sin(12 * np.pi * x))
+    slope = 1e-6 * np.sqrt(np.mean(np.diff(along * 1e6) ** 2)) / (1e-3 / 64)
+    for across, count in ((0.2, 1), (1.0, 0)):
+        height = along[None, :] + across * along[:, None]
+        one = MeasuredSurface(height, 1e-3, 1e-3, True, "m", source={"name": "plate"})
+        notes = [note for note in MeasuredRoad([one], 64).notes if "direction" in note]
+        assert len(notes) == count
+        assert not notes or notes[0].startswith(
+            f"plate: the rms slope is {slope:.2g} along x and {0.2 * slope:.2g} along y")
 
 
 def test_profiles_of_a_map_have_its_spectrum():

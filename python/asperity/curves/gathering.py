@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ FloatArray = NDArray[np.float64]
 #: Factor of Yang and Persson in the theory that is compared with the runs; the thesis uses 0.45.
 GAMMA = 0.45
 
+_MUCH = 0.5     # friction of the omitted waves over that of the others above which a note is given
 _NAMES = ("friction", "friction_viscous", "contact_area", "mean_gap")
 
 
@@ -62,11 +64,13 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
                 sources[at] = (piece.job.path, int(run.history["step"][row]))
         lost.append((piece, rows, run))
     values["friction_interface"] = values["friction"] - values["friction_viscous"]
-    notes = [*plan.all_notes, *_join_note(plan, lost)]
     losses, octave = _losses(plan, lost)
+    expected = _theory(plan, pieces, extend)
+    notes = [*plan.all_notes, *_join_note(plan, lost),
+             *_left_out_note(values["friction"], expected["friction_left_out"])]
     return FrictionCurve(
         plan.pressure, plan.temperature, plan.speed, _labels(pieces), values,
-        _theory(plan, pieces, extend), losses, octave, plan.compound.series.tau,
+        expected, losses, octave, plan.compound.series.tau,
         np.array([plan.compound.a_t(float(t)) for t in plan.temperature]),
         np.array([plan.compound.b_t(float(t)) for t in plan.temperature]), sources,
         _settings(plan, extend), notes, remarks_of(plan, [piece for piece, _ in pieces]))
@@ -126,6 +130,20 @@ def _theory(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | 
                 solve(whole.wavenumber, whole.psd).friction
                 - solve(kept.wavenumber, kept.psd).friction)
     return found
+
+
+def _left_out_note(friction: FloatArray, left_out: FloatArray) -> list[str]:
+    """Return a note if the omitted waves would add much to the friction, by Persson's theory."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # points at which no patch converged
+        mean = np.nanmean(friction, axis=-1)
+    much = left_out > _MUCH * np.abs(mean)
+    if not much.any():
+        return []
+    at = np.unravel_index(int(np.argmax(np.where(much, left_out, -math.inf))), left_out.shape)
+    return [f"by Persson's theory the waves that the patches leave out would add up to"
+            f" {left_out[at]:.2g} to the friction, where it is {mean[at]:.2g}: patches with more"
+            " cells (--cells) contain more of them"]
 
 
 def _is_wider(whole: Spectrum, kept: Spectrum) -> bool:

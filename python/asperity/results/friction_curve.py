@@ -26,6 +26,8 @@ __all__ = ["COLUMNS", "MEANINGS", "FrictionCurve", "interval"]
 
 FloatArray = NDArray[np.float64]
 
+_SMALL = 1e-3     # friction below which four decimals would show few digits or none
+
 COLUMNS = ("pressure", "temperature", "speed", "friction", "friction_low", "friction_high",
            "friction_viscous", "contact_area", "mean_gap", "friction_persson", "patches",
            "not_converged", "with_warnings")
@@ -368,11 +370,9 @@ class FrictionCurve:
         points = np.ndindex(self.values["friction"].shape[:3])
         for at, row in zip(points, self.rows(), strict=True):
             low, high = row[4:6]
-            # Adding 0 turns a negative zero into zero.
-            known = (f"{round(low, 4) + 0.0:.4f}..{round(high, 4) + 0.0:.4f}"
-                     if math.isfinite(low) else "-")
-            cells = (f"{row[0]:.4g}", f"{row[1]:g}", f"{row[2]:.4g}", f"{row[3]:.4f}", known,
-                     f"{row[6]:.4f}", f"{row[7]:.4g}", f"{row[9]:.4f}", str(row[10]))
+            known = f"{_rounded(low)}..{_rounded(high)}" if math.isfinite(low) else "-"
+            cells = (f"{row[0]:.4g}", f"{row[1]:g}", f"{row[2]:.4g}", _rounded(row[3]), known,
+                     _rounded(row[6]), f"{row[7]:.4g}", _rounded(row[9]), str(row[10]))
             lines.append("  ".join(cell.rjust(max(9, len(head)))
                                    for cell, head in zip(cells, heads, strict=True))
                          + f"  {marks_of(self.remarks, at)}".rstrip())
@@ -384,3 +384,10 @@ class FrictionCurve:
     def settings_text(self) -> Mapping[str, str]:
         """Return the settings of the computation as text."""
         return {name: str(value) for name, value in self.settings.items()}
+
+
+def _rounded(friction: float) -> str:
+    """Return a friction coefficient with four decimals, or fewer digits of a very small one."""
+    if 0.0 < abs(friction) < _SMALL:
+        return f"{friction:.1e}"
+    return f"{friction + 0.0:.4f}"  # adding 0 turns a negative zero into zero

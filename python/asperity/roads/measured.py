@@ -33,6 +33,7 @@ _AS_IS = "as-is"        # of `periodic`: opposite edges match already
 
 # Opposite edges fit if the mean square of their steps is at most this multiple of that inside.
 _SIMILAR = 4.0
+_STEEP = 3.0            # rms slope above which a unit is likely to be wrong
 
 
 @dataclass(frozen=True)
@@ -379,11 +380,22 @@ def _advice(work: MapWork, level: str) -> list[str]:
                          " level = 'tilt' (--level tilt) takes it off")
     if variance == 0.0:
         notes.append("the map is flat")
+    if (slope := _largest_slope(work)) > _STEEP:
+        notes.append(f"the rms slope is {slope:.2g}: no road is so steep; often the heights or the"
+                     " lengths are in another unit (unit, scale, size)")
     if not work.periodic:
         notes.append(_edge_note(work.height))
     elif any(step["step"] == "periodic" for step in work.steps) and not _edges_fit(work.height):
         notes.append("the map is declared periodic, but opposite edges do not fit")
     return notes
+
+
+def _largest_slope(work: MapWork) -> float:
+    """Return the larger of the rms slopes along x and y, from differences of neighbours."""
+    slopes = [float(np.sqrt(np.mean(np.diff(work.height, axis=1 - axis) ** 2))) * count / length
+              for axis, (count, length) in enumerate(
+                  zip(work.height.shape[::-1], work.sizes, strict=True)) if count > 1]
+    return max(slopes)
 
 
 def _edge_note(height: FloatArray) -> str:

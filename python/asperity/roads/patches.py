@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 
 _CELLS_IN_DRAWN_WAVE = 8.0      # in the shortest wave of a drawn map
 _CELLS_IN_MEASURED_WAVE = 6.0   # in the shortest wave of a measured map
+_DIRECTED = 1.5                 # ratio of the rms slopes along x and y above which a note is given
 
 
 @dataclass(frozen=True)
@@ -166,6 +167,7 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
     choice("outliers", outliers, ("report", "remove"))
     name = one.source.get("name", "map")
     notes = [f"{name}: {step_in_words(step)}" for step in one.steps if step["step"] == "fill"]
+    notes += [f"{name}: {note}" for note in _direction_note(one)]
     found = find_outliers(one.height)
     if not found.count:
         return one, notes
@@ -175,6 +177,20 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
     notes.append(f"{name}: {found.summary()}: replaced by the median of the neighbours")
     return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
                            one.source, one.notes), notes
+
+
+def _direction_note(one: MeasuredSurface) -> list[str]:
+    """Return a note on a map whose slopes differ along its two axes."""
+    ny, nx = one.height.shape
+    if ny == 1:
+        return []
+    slopes = [float(np.sqrt(np.mean(np.diff(one.height, axis=axis) ** 2))) / step
+              for axis, step in ((1, one.lx / nx), (0, one.ly / ny))]
+    if max(slopes) <= _DIRECTED * min(slopes):
+        return []
+    return [f"the rms slope is {slopes[0]:.2g} along x and {slopes[1]:.2g} along y: the friction"
+            " depends on the direction of sliding (angle, --angle), but Persson's theory and drawn"
+            " maps take the road for isotropic"]
 
 
 def _check_short(short: float, cell: float, side: float) -> None:

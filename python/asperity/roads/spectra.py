@@ -26,6 +26,7 @@ _PER_DECADE = 20        # bands of a measured spectrum per decade
 _WAVES_IN_MAP = 3.0     # periods within the map of the longest wave that a scan measures reliably
 _CELLS_IN_WAVE = 6.0    # cells within the shortest such wave
 _LONGEST_NAME = 120     # characters of the name of several roads
+_NO_WAVES = 1e-3        # share of the mean square height of long waves that count as none
 _ROUND_OFF = 1e-16      # share of the largest density times k^2 below which a density is round-off
 
 
@@ -248,11 +249,23 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
         notes = [] if road[-1] > 0.99 * k[-1] else [
             f"{name}: has no waves shorter than {2.0 * math.pi / road[-1]:.3g} m, although those"
             f" down to {2.0 * math.pi / k[-1]:.3g} m were measured"]
-        return Spectrum(road, psd, name, notes)
+        return _without_empty_start(Spectrum(road, psd, name, notes))
     ky = 2.0 * math.pi * np.fft.fftfreq(ny, ly / ny)
     k = np.hypot(kx, ky[:, None]).ravel()[1:]
     k, psd = _banded(k, (power * lx * ly).ravel()[1:], min(lx, ly), max(lx / nx, ly / ny), name)
-    return Spectrum(k, psd, name)
+    return _without_empty_start(Spectrum(k, psd, name))
+
+
+def _without_empty_start(spectrum: Spectrum) -> Spectrum:
+    """Return a spectrum without its longest waves if they have nearly none of its height.
+
+    A scan measures waves up to a third of its length, also where the road has none of them. The
+    maps that are drawn would otherwise be far larger than its waves.
+    """
+    k = np.geomspace(spectrum.wavenumber[0], spectrum.wavenumber[-1], 2000)
+    below = np.concatenate([[0.0], np.cumsum(np.diff(k) * (spectrum.at(k) * k)[1:])])
+    first = int(np.searchsorted(below, _NO_WAVES * below[-1])) - 1
+    return spectrum if first < 1 else spectrum.cut(long=2.0 * math.pi / k[first])
 
 
 def isotropic_of_profile(wavenumber: FloatArray, psd: FloatArray, *, name: str = "profile"

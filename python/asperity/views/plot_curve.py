@@ -94,7 +94,9 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
             panel.set_ylabel(text)
             panel.grid(alpha=0.3)
         for panel in places[:-1]:
-            panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
+            low, high = panel.get_ylim()
+            low = min(0.0, low)
+            panel.set_ylim(low, high + 0.05 * (high - low))
         places[-1].set_yscale("log")
         if (curve.mean("contact_area")[1] <= 0.0).any():
             places[-1].set_ylim(bottom=floor)
