@@ -21,7 +21,7 @@ module joint_step
 
    public :: joint_step_type
 
-   integer, parameter :: impatient = 3                 !! steps of Newton's method that must halve the residual
+   integer, parameter :: impatient = 8                 !! steps of Newton's method that must halve the residual
 
    !> The equations and the method. A variable of this type must not be copied.
    type :: joint_step_type

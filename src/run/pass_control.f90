@@ -24,8 +24,8 @@
 !> A step may also be solved all at once (`joint_due`), at most twice per row. The first attempt is made after a few
 !> passes (`few`), if more than as many again are to be expected at their present rate. On steep roads it takes far
 !> less time than the passes would. With unknown shares it would often take more, and is not made. The second one is
-!> made, from a better place, if the passes stall even with plain steps, and may then never settle. An attempt that is
-!> `thorough` may cost as much as many passes; the first one is so only if `many` passes are to be expected.
+!> made, from a better place, if the passes stall even with plain steps, and may then never settle. It is `thorough`:
+!> it may cost as much as many passes, and may find a solution that is far away. The first one is neither.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -48,7 +48,6 @@ module pass_control
    integer, parameter :: stalled = 15               !! accelerated passes that must halve the mismatch
    integer, parameter :: few = 6                    !! passes before the first attempt to solve the step all at once
    integer, parameter :: rated = 3                  !! last passes of these whose rate counts
-   integer, parameter :: many = 30                  !! passes that cost more than a thorough attempt
 
    ! Plain steps. If the residual keeps its direction, their length and momentum grow; if it turns, both shrink.
    integer, parameter :: stalled_plain = 60         !! plain passes that must halve the mismatch
@@ -154,20 +153,19 @@ contains
       end if
       if (self%count == few - rated) self%marked = self%least
       if (self%count == few .and. .not. self%sharing) then
-         self%joint_due = takes_more_than(self, few)
-         self%thorough = takes_more_than(self, many)
+         self%joint_due = is_slow(self)
+         self%thorough = .false.
       end if
    end subroutine judge
 
-   !> Are more passes than a number to be expected, at the rate of the last ones?
-   pure logical function takes_more_than(self, passes) result(yes)
+   !> Are more passes to be expected than have been done, at the rate of the last ones?
+   pure logical function is_slow(self)
       class(pass_control_type), intent(in) :: self
-      integer, intent(in) :: passes
       real(dp) :: rate                              !! of the logarithm of the mismatch, per pass
 
       rate = log(self%marked/self%least)/rated
-      yes = log(self%least/self%tolerance) > passes*rate
-   end function takes_more_than
+      is_slow = log(self%least/self%tolerance) > few*rate
+   end function is_slow
 
    !> Require the tolerance itself if the next pass would be solved nearly to it. This may save a pass, because the next
    !> one may then be the last.
