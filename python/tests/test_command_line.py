@@ -71,7 +71,7 @@ def test_values_without_effect_are_reported(program, folder, old, new, printed):
     ("steady = .true., velocity_x = 1e-4", "", "If a steady row converges slowly, the pressures of"
      " all cells are solved for at once. This takes up to"),
     ("duration = 1, velocity_x = 1e-4", "&friction law = 'coulomb', coefficient = 0.3 /",
-     "Pressure and friction of a row are solved for in turn. If that does not settle, both are"
+     "Pressure and friction of a row are solved for in turn. If that settles slowly, both are"
      " solved for together, in all cells at once. This takes up to"),
 ])
 def test_memory_of_rows_that_are_solved_at_once(program, folder, phase, law, printed):

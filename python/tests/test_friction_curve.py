@@ -1237,7 +1237,7 @@ def test_outliers_of_profiles(tmp_path, monkeypatch, capsys):
 
 def test_waves_that_are_left_out_are_noted():
     """On few cells most of the friction may be in waves that the patches do not contain."""
-    friction = np.array([0.1, 0.01, np.nan]).reshape(1, 1, 3, 1)
+    friction = np.array([0.1, 0.01, np.nan]).reshape(1, 1, 3)
     left_out = np.array([0.02, 0.03, 0.5]).reshape(1, 1, 3)
     (note,) = _left_out_note(friction, left_out)
     assert "would add up to 0.03 to the friction, where it is 0.01" in note

@@ -496,14 +496,14 @@ def test_esri_grids(tmp_path):
         known[4, 4] = False
         np.testing.assert_allclose(found.height[known], 1e-6 * height[known], rtol=1e-8)
         assert np.abs(found.height).max() < 1e-5
-    (tmp_path / "map.asc").write_text(head + body[:-20] + "\n")
-    with pytest.raises(ValueError, match="heights: must have 54, because ncols = 9 and nrows = 6"):
+    (tmp_path / "map.asc").write_text(head + body[:body.rindex("\n")])
+    with pytest.raises(ValueError, match="has 5 rows of 9 heights: must have nrows = 6 of"):
         load(tmp_path / "map.asc", unit="um")
     (tmp_path / "map.asc").write_text(head.replace("DX 5", "DX 0") + body)
     with pytest.raises(ValueError, match="must give ncols, nrows and cellsize, all positive"):
         load(tmp_path / "map.asc", unit="um")
     (tmp_path / "map.asc").write_text(head + body.replace("-9999", "gap"))
-    with pytest.raises(ValueError, match=r"map.asc: a height is no number .*'gap'"):
+    with pytest.raises(ValueError, match=r"map.asc: line 8: column 5 = 'gap': must be a number"):
         load(tmp_path / "map.asc", unit="um")
 
 

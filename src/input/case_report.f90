@@ -92,7 +92,7 @@ contains
       if (case%friction%law == 'none') then
          text = '! If a steady row converges slowly, the pressures of all cells are solved for at once. This'
       else
-         text = '! Pressure and friction of a row are solved for in turn. If that does not settle, both are solved '// &
+         text = '! Pressure and friction of a row are solved for in turn. If that settles slowly, both are solved '// &
             'for together, in all cells at once. This'
       end if
       text = text//' takes up to '//memory_text(joint_memory(case))//' more, depending on how many cells touch. '// &

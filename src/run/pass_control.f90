@@ -25,7 +25,8 @@
 !> passes (`few`), if more than as many again are to be expected at their present rate. On steep roads it takes far
 !> less time than the passes would. With unknown shares it would often take more, and is not made. The second one is
 !> made, from a better place, if the passes stall even with plain steps, and may then never settle. It is `thorough`:
-!> it may cost as much as many passes, and may find a solution that is far away. The first one is neither.
+!> it may cost as much as many passes, and may find a solution that is far away. The first one ends soon if it does not
+!> succeed, and its solution is usually near.
 module pass_control
    use asperity_precision, only : dp
    implicit none
@@ -70,11 +71,11 @@ module pass_control
       logical :: plain = .false.                    !! the steps are not accelerated
       logical :: best_yet = .false.                 !! the last pass was the best
       logical :: joint_due = .false.                !! the step should be solved all at once
-      logical :: thorough = .false.                 !! this attempt may cost as much as many passes
+      logical :: thorough = .false.                 !! the attempt may take long
       real(dp), private :: tolerance = 0.0_dp
       logical, private :: sharing = .false.         !! the shares of the cells at the edge are unknown, too
       real(dp), private :: fraction = usual_fraction
-      logical, private :: may_be_joint = .true.     !! the row may still be solved all at once
+      logical, private :: may_be_joint = .true.     !! there has been no thorough attempt
       real(dp), private :: slowed = slow_damping    !! damping after slow progress
       real(dp), private :: length = 1.0_dp          !! of plain steps
       real(dp), private :: plain_start = 0.0_dp     !! least mismatch when the plain steps began
@@ -144,8 +145,10 @@ contains
       end if
       if (self%plain) then
          self%joint_due = self%since >= stalled_plain .and. self%may_be_joint
-         if (self%joint_due) self%may_be_joint = .false.
-         self%thorough = .true.
+         if (self%joint_due) then
+            self%may_be_joint = .false.
+            self%thorough = .true.
+         end if
          if (self%since >= stalled_plain .or. mismatch < recovered*self%plain_start) &
             call end_plain_steps(self, mismatch)
       else if (self%since >= stalled) then
@@ -161,10 +164,12 @@ contains
    !> Are more passes to be expected than have been done, at the rate of the last ones?
    pure logical function is_slow(self)
       class(pass_control_type), intent(in) :: self
-      real(dp) :: rate                              !! of the logarithm of the mismatch, per pass
+      real(dp) :: left                              !! the mismatch, but not 0
+      real(dp) :: rate                              !! of its logarithm, per pass
 
-      rate = log(self%marked/self%least)/rated
-      is_slow = log(self%least/self%tolerance) > few*rate
+      left = max(self%least, tiny(1.0_dp))
+      rate = log(self%marked/left)/rated
+      is_slow = log(left/self%tolerance) > few*rate
    end function is_slow
 
    !> Require the tolerance itself if the next pass would be solved nearly to it. This may save a pass, because the next

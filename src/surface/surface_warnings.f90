@@ -21,8 +21,8 @@ module surface_warnings
 
    integer, parameter, public :: warning_length = 400
    real(dp), parameter, public :: largest_slope = 3.0_dp   !! far beyond what a theory for small slopes describes
-   !> Rms slope times coefficient from which rows with friction were seen to fail in trials on self-affine roads: up to
-   !> 0.3 all of them were solved, at 0.4 a part, and from 0.5 on none.
+   !> Rms slope times coefficient above which friction may wedge. In trials on self-affine roads all runs succeeded up to
+   !> 0.3, some of them at 0.4, and none from 0.5 on.
    real(dp), parameter :: wedging = 0.4_dp
    real(dp), parameter :: cells_per_wave = 8.0_dp      !! enough for contact areas of some percent
    real(dp), parameter :: round_off = 1.0e-9_dp
@@ -180,8 +180,8 @@ contains
       call append(warnings, text)
    end subroutine check_slope
 
-   !> On slopes above 1/mu friction can hold any force uphill. If much of a rough road is so steep, rows of a slide may
-   !> have no solution.
+   !> On slopes above 1/mu friction can hold any force uphill. If parts of the contact are so steep, rows of a slide may
+   !> have no solution. The slope of a random road whose height is given is not known here, and is not checked.
    subroutine check_wedging(start, slope, mu, warnings)
       character(*), intent(in) :: start           !! of the warning
       real(dp), intent(in) :: slope               !! rms
@@ -191,7 +191,7 @@ contains
 
       if (.not. mu*slope > wedging) return
       text = start//'the rms slope of about '//rounded_text(slope, 3)//' times the coefficient is '// &
-         rounded_text(mu*slope, 2)//': above about 0.4 much of the road is steeper than 1/coefficient, where '// &
+         rounded_text(mu*slope, 2)//': above about 0.4 parts of the contact are steeper than 1/coefficient, where '// &
          'friction can hold any force uphill; rows of a slide may take very many passes, or end unsolved (status 4)'
       call append(warnings, text)
    end subroutine check_wedging

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -64,16 +63,16 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
                 sources[at] = (piece.job.path, int(run.history["step"][row]))
         lost.append((piece, rows, run))
     values["friction_interface"] = values["friction"] - values["friction_viscous"]
+    notes = [*plan.all_notes, *_join_note(plan, lost)]
     losses, octave = _losses(plan, lost)
-    expected = _theory(plan, pieces, extend)
-    notes = [*plan.all_notes, *_join_note(plan, lost),
-             *_left_out_note(values["friction"], expected["friction_left_out"])]
-    return FrictionCurve(
+    curve = FrictionCurve(
         plan.pressure, plan.temperature, plan.speed, _labels(pieces), values,
-        expected, losses, octave, plan.compound.series.tau,
+        _theory(plan, pieces, extend), losses, octave, plan.compound.series.tau,
         np.array([plan.compound.a_t(float(t)) for t in plan.temperature]),
         np.array([plan.compound.b_t(float(t)) for t in plan.temperature]), sources,
         _settings(plan, extend), notes, remarks_of(plan, [piece for piece, _ in pieces]))
+    curve.notes.extend(_left_out_note(curve.mean("friction")[0], curve.theory["friction_left_out"]))
+    return curve
 
 
 def _labels(pieces: list[tuple[Piece, Patch]]) -> list[str]:
@@ -134,16 +133,13 @@ def _theory(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | 
 
 def _left_out_note(friction: FloatArray, left_out: FloatArray) -> list[str]:
     """Return a note if the omitted waves would add much to the friction, by Persson's theory."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # points at which no patch converged
-        mean = np.nanmean(friction, axis=-1)
-    much = left_out > _MUCH * np.abs(mean)
+    much = left_out > _MUCH * np.abs(friction)
     if not much.any():
         return []
     at = np.unravel_index(int(np.argmax(np.where(much, left_out, -math.inf))), left_out.shape)
     return [f"by Persson's theory the waves that the patches leave out would add up to"
-            f" {left_out[at]:.2g} to the friction, where it is {mean[at]:.2g}: patches with more"
-            " cells (--cells) contain more of them"]
+            f" {left_out[at]:.2g} to the friction, where it is {friction[at]:.2g}: patches with"
+            " more cells (--cells) contain more of them"]
 
 
 def _is_wider(whole: Spectrum, kept: Spectrum) -> bool:

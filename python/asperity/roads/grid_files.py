@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.tables import is_number, text_of
-from .map_files import PlainMap, PlainReader
+from ..base.tables import is_number, text_lines
+from .map_files import PlainMap, PlainReader, text_table
 
 __all__ = ["esri_grid"]
 
 _NAMES = {"ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize", "dx",
           "dy", "nodata_value"}
-_LONGEST = 12           # lines of a header
 _START = 200            # characters of a file in which its header must begin
+_NO_HEIGHT = -9999.0    # what marks a missing height if the header does not say
 
 
 def esri_grid(path: Path) -> PlainReader | None:
@@ -39,35 +39,32 @@ def esri_grid(path: Path) -> PlainReader | None:
     Raises
     ------
     ValueError
-        If the header lacks a number, or the number of heights does not fit it.
+        If the header lacks a number, the rows do not fit it, or a height is no number.
     """
     with path.open("rb") as file:
         if not file.read(_START).lstrip().lower().startswith((b"ncols", b"nrows")):
             return None
-    lines = text_of(path).splitlines()
-    header = {}
-    for line in lines[:_LONGEST]:
-        words = line.replace(",", ".").split()
-        if len(words) != 2 or words[0].lower() not in _NAMES or not is_number(words[1]):
-            break
-        header[words[0].lower()] = float(words[1])
+    header = _header(path)
     dx, dy = (header.get(name, header.get("cellsize", 0.0)) for name in ("dx", "dy"))
-    nx, ny = (int(header.get(name, 0)) for name in ("ncols", "nrows"))
-    if min(nx, ny) < 1 or not min(dx, dy) > 0.0:
+    nx, ny = (header.get(name, 0.0) for name in ("ncols", "nrows"))
+    if not (min(nx, ny) >= 1.0 and min(dx, dy) > 0.0):
         raise ValueError(f"{path}: the header of an ESRI ASCII grid must give ncols, nrows and"
                          " cellsize, all positive")
-    height = _numbers(path, " ".join(lines[len(header):]).replace(",", "."))
-    if height.size != nx * ny:
-        raise ValueError(f"{path}: has {height.size} heights: must have {nx * ny}, because ncols"
-                         f" = {nx} and nrows = {ny}")
-    height[height == header.get("nodata_value", -9999.0)] = np.nan
-    array = height.reshape(ny, nx)[::-1].T.copy()
-    return PlainReader("esri ascii grid", PlainMap(array, "Default", (nx * dx, ny * dy)))
+    height, _ = text_table(path)
+    if height.shape != (ny, nx):
+        raise ValueError(f"{path}: has {height.shape[0]} rows of {height.shape[1]} heights: must"
+                         f" have nrows = {ny:g} of ncols = {nx:g}")
+    height[height == header.get("nodata_value", _NO_HEIGHT)] = np.nan
+    return PlainReader("esri ascii grid",
+                       PlainMap(height[::-1].T.copy(), "Default", (nx * dx, ny * dy)))
 
 
-def _numbers(path: Path, text: str) -> np.ndarray:
-    """Return the heights, with NaN where they are written as such."""
-    try:
-        return np.array(text.split(), dtype=float)
-    except ValueError as error:
-        raise ValueError(f"{path}: a height is no number ({error})") from None
+def _header(path: Path) -> dict[str, float]:
+    """Return the numbers of the header by their names in small letters."""
+    header = {}
+    for _, line in text_lines(path)[:len(_NAMES)]:
+        name, *values = line.replace(",", ".").split()
+        if name.lower() not in _NAMES or len(values) != 1 or not is_number(values[0]):
+            break
+        header[name.lower()] = float(values[0])
+    return header

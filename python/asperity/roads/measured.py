@@ -47,7 +47,8 @@ class MeasuredSurface:
     lx, ly : float
         Lengths, m.
     periodic : bool
-        Whether opposite edges match: the file says so, or a window has made the map periodic.
+        Whether opposite edges match: the file or the user says so, or a window has made the map
+        periodic.
     unit : str
         Unit of the file, such as 'um'.
     steps : list of dict
@@ -360,7 +361,7 @@ def _jump_note(jump: float | None, level: str, unit: str, windowed: bool) -> lis
     if jump is None:
         return []
     what = "plane" if level == "tilt" else "paraboloid"
-    return [f"the file says that the map is periodic, but without its {what} opposite edges differ"
+    return [f"the map is periodic as it was read, but without its {what} opposite edges differ"
             f" by up to {jump:.3g} {unit}"
             + ("" if windowed else ": it is not periodic any more")
             + "; level = 'mean' (--level mean) keeps it periodic"]
@@ -380,7 +381,9 @@ def _advice(work: MapWork, level: str) -> list[str]:
                          " level = 'tilt' (--level tilt) takes it off")
     if variance == 0.0:
         notes.append("the map is flat")
-    if (slope := _largest_slope(work)) > _STEEP:
+    lx, ly = work.sizes
+    slope = statistics(work.height, lx, ly, "free").rms_slope_differences
+    if slope > _STEEP:
         notes.append(f"the rms slope is {slope:.2g}: no road is so steep; often the heights or the"
                      " lengths are in another unit (unit, scale, size)")
     if not work.periodic:
@@ -388,14 +391,6 @@ def _advice(work: MapWork, level: str) -> list[str]:
     elif any(step["step"] == "periodic" for step in work.steps) and not _edges_fit(work.height):
         notes.append("the map is declared periodic, but opposite edges do not fit")
     return notes
-
-
-def _largest_slope(work: MapWork) -> float:
-    """Return the larger of the rms slopes along x and y, from differences of neighbours."""
-    slopes = [float(np.sqrt(np.mean(np.diff(work.height, axis=1 - axis) ** 2))) * count / length
-              for axis, (count, length) in enumerate(
-                  zip(work.height.shape[::-1], work.sizes, strict=True)) if count > 1]
-    return max(slopes)
 
 
 def _edge_note(height: FloatArray) -> str:
