@@ -404,6 +404,11 @@ def test_info(program, tmp_path):
     assert "  friction            0.25\n" in printed and "stick_area" not in printed
     assert "largest residual_tangential of all rows: 2e-9" in printed
     with h5py.File(path, "a") as file:
+        file["grid"].attrs["boundary"] = "free"
+    printed = call(program, "info", path).out
+    assert "  force               0.05 N\n" in printed, "the pressure times 0.5 mm2"
+    assert "  pressure  " not in printed
+    with h5py.File(path, "a") as file:
         del file.attrs["title"]
     assert call(program, "info", path).returncode == 3
     path.write_bytes(b"not HDF5 at all")

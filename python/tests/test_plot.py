@@ -391,6 +391,36 @@ def test_titles_are_not_read_as_formulas(result, tmp_path):
     assert is_picture(tmp_path / "overview.png")
 
 
+@pytest.fixture(scope="module")
+def pull_off(tmp_path_factory):
+    """A sphere in free mode that is pulled off by a prescribed approach."""
+    case = tmp_path_factory.mktemp("free") / "sphere.nml"
+    case.write_text("""
+        &grid nx = 32, ny = 32, lx = 30e-6, boundary = 'free' /
+        &surface shape = 'sphere', radius = 50e-6 /
+        &material shear_modulus = 1e6, poisson = 0.5 /
+        &adhesion potential = 'exponential', energy = 0.05, range = 200e-9 /
+        &phase displacement = 4e-7 /
+        &phase displacement = -2e-7, steps = 6, ramp = 'linear' /
+        """)
+    return asperity.run(case)
+
+
+def test_the_load_of_a_free_contact_is_a_force(pull_off):
+    """The size of the grid is arbitrary in free mode, and so is the mean pressure."""
+    force = pull_off.history["pressure"] * 30e-6**2
+    axes = pull_off.plot("force", x="displacement")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("approach (nm)", "normal force (µN)")
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), force * 1e6)
+    assert pull_off.plot("contact_area").get_xlabel() == "normal force (µN)"
+    panel = pull_off.overview().axes[2]
+    assert panel.get_title() == "Force against approach"
+    np.testing.assert_allclose(panel.lines[0].get_ydata(), force * 1e6)
+    assert f"force {force[-1]:.6g} N" in repr(pull_off)
+    with pytest.raises(KeyError, match="did you mean 'force'"):
+        pull_off.plot("contact_area", x="forc")
+
+
 def test_a_small_contact_of_a_free_map_is_enlarged(tmp_path):
     path = frictional_result(tmp_path / "sphere.h5", nx=64, ny=48, ly=1.8e-3, boundary="free")
     with h5py.File(path, "a") as file:

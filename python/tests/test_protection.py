@@ -72,6 +72,9 @@ def test_unfinished_run_without_a_checkpoint(program: str, case: Path) -> None:
     assert ("y.h5: holds an unfinished run, and there is no checkpoint: --overwrite starts again"
             in done.stderr)
     assert "--restart" not in done.stderr
+    # The refused run leaves the lock of the dead process, which shows that this process has ended.
+    assert f"asperity process {process.pid} on" in case.with_suffix(".lock").read_text()
+    assert "its process has ended" in asperity.open(case.with_suffix(".h5")).state
     with pytest.raises(OSError, match=r"no checkpoint: overwrite=True starts again"):
         asperity.run(case)
     done = vc.run(program, case, "--restart")

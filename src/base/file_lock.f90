@@ -3,13 +3,15 @@
 !> The lock is flock(2) on a small file beside the files that it protects. The system releases it
 !> when the process ends, for whatever reason. The file contains a line about the process that holds
 !> the lock; other processes quote this line in their error messages. The file is removed when the lock
-!> is released; a file that a dead process left behind does no harm. On a file system without locks
-!> there is no protection.
+!> is released. A file that a dead process left behind does no harm, and shows that this process has ended. A
+!> process that takes the lock without using it therefore leaves such a file as it was. On a file system without
+!> locks there is no protection.
 module file_lock
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_errors, only : error_file, error_type, fail
    use file_kind, only : file_start, is_other_than_file, same_inode
    use file_system, only : remove_file
+   use text_tools, only : to_text
    use utc_clock, only : utc_time
    implicit none
    private
@@ -27,6 +29,7 @@ module file_lock
       private
       integer :: unit = 0                                  !! 0 if no file is open
       character(:), allocatable :: path
+      character(:), allocatable :: left                    !! the line that a dead process left in the file; '' if none
    contains
       procedure :: acquire
       procedure :: release
@@ -83,6 +86,8 @@ contains
          if (c_flock(int(fnum(self%unit), c_int), exclusive_at_once) /= 0) then
             if (any(ierrno() == would_block)) then
                holder = first_line(self%unit)
+               if (holder == '') holder = 'asperity another process'
+               holder = holder(len('asperity ') + 1:)
                close (self%unit)
                self%unit = 0
                call fail(error, error_file, protected//': is in use by '//holder// &
@@ -101,14 +106,12 @@ contains
          return
       end if
       self%path = path
+      self%left = first_line(self%unit)
       call hostnm(host)
-      rewind (self%unit)
-      write (self%unit, '(a, i0, a)', iostat=status) mark, c_getpid(), ' on '//trim(host)// &
-         ' since '//utc_time()
-      flush (self%unit, iostat=status)
+      call write_line(self%unit, mark//to_text(int(c_getpid()))//' on '//trim(host)//' since '//utc_time())
    end subroutine acquire
 
-   !> The process that holds the lock, according to the file.
+   !> The line of a process in the file of a lock; empty if there is none.
    function first_line(unit) result(text)
       integer, intent(in) :: unit
       character(:), allocatable :: text
@@ -117,17 +120,33 @@ contains
 
       rewind (unit)
       read (unit, '(a)', iostat=status) line
-      text = 'another process'
-      if (status == 0 .and. index(line, mark) == 1) text = trim(line(len('asperity ') + 1:))
+      text = ''
+      if (status == 0 .and. index(line, mark) == 1) text = trim(line)
    end function first_line
 
+   !> Replace the content of the file by a line.
+   subroutine write_line(unit, line)
+      integer, intent(in) :: unit
+      character(*), intent(in) :: line
+      integer :: status
+
+      rewind (unit)
+      write (unit, '(a)', iostat=status) line
+      flush (unit, iostat=status)
+   end subroutine write_line
+
    !> Release the lock. Nothing happens if it is not held.
-   subroutine release(self)
+   subroutine release(self, used)
       class(file_lock_type), intent(inout) :: self
+      logical, intent(in) :: used                          !! whether the protected files were changed under the lock
       integer(c_int) :: status
 
       if (self%unit == 0) return
-      call remove_file(self%path)
+      if (used .or. self%left == '') then
+         call remove_file(self%path)
+      else
+         call write_line(self%unit, self%left)
+      end if
       ! Closing is not enough, because a child of this process may have the file open as well.
       status = c_flock(int(fnum(self%unit), c_int), unlock)
       close (self%unit)

@@ -179,7 +179,7 @@ contains
       text = text//'grid        '//to_text(nx)//' x '//to_text(ny)//' cells, '//to_text(lx)//' m x '// &
          to_text(ly)//' m, '//boundary//nl
       text = text//phases_text(input)
-      call history_text(file, text, error)
+      call history_text(file, merge(lx*ly, 0.0_dp, boundary == 'free'), text, error)
       if (allocated(error)) return
       if (finished == 1) then
          text = text//'finished    yes'//nl
@@ -261,8 +261,9 @@ contains
    end function phases_text
 
    !> Add the last row of the history, and the largest residuals of all rows.
-   subroutine history_text(file, text, error)
+   subroutine history_text(file, area, text, error)
       type(hdf5_file_type), intent(inout) :: file
+      real(dp), intent(in) :: area                   !! of the grid in free mode, m2; 0 in periodic mode
       character(:), allocatable, intent(inout) :: text
       type(error_type), allocatable, intent(out) :: error
       character(*), parameter :: names(11) = [character(20) :: 'step', 'phase', 'time', 'pressure', &
@@ -306,7 +307,12 @@ contains
       text = text//nl//'last row'//nl
       do i = 1, size(names)
          if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is no friction
-         text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
+         ! In free mode the size of the grid is arbitrary, and so is the mean pressure.
+         if (names(i) == 'pressure' .and. area > 0.0_dp) then
+            text = text//'  force'//repeat(' ', len(names) - len('force'))//to_text(last(i)*area)//' N'//nl
+         else
+            text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
+         end if
       end do
 
       do i = 1, size(names)

@@ -35,6 +35,7 @@ module run_files
       character(:), allocatable :: path                !! of the result
       type(result_file_type), private :: result
       type(file_lock_type), private :: lock            !! prevents other runs from writing this result
+      logical, private :: writes = .false.             !! whether this run has begun to write the result
       character(:), allocatable, private :: settings   !! every resolved setting, one per line
       character(:), allocatable, private :: identity   !! settings that must agree for a restart
       character(:), allocatable, private :: warnings   !! all of the run, one per line
@@ -109,6 +110,7 @@ contains
 
          if (is_first_process()) call self%result%create(self%path, sim%grid, plan, error)
          call agree(error)
+         self%writes = .not. allocated(error)
          if (allocated(error)) return
 
          call write_height(self%result, sim)
@@ -183,7 +185,8 @@ contains
       if (allocated(error)) return
       call self%result%reopen(self%path, id, sim%state%row%step, &
          sim%case%output%compression, error)
-      if (.not. allocated(error)) call self%result%write_text('outcome', 'running', error)
+      self%writes = .not. allocated(error)
+      if (self%writes) call self%result%write_text('outcome', 'running', error)
    end subroutine resume_result
 
    !> Check that the height map is that of the checkpoint. For maps from files the checksums in the identity ensure
@@ -342,7 +345,7 @@ contains
 
       if (is_first_process()) then
          call self%result%close(error)
-         call self%lock%release()
+         call self%lock%release(used=self%writes)
       end if
       call agree(error)
    end subroutine close_files

@@ -36,11 +36,11 @@ def add_plot(verbs: Any) -> None:
                            " the default is stick and slip, or without friction the pressure")
     what.add_argument("--history", metavar="NAME",
                       help="draw a column of the history, for example friction (with its causes),"
-                           " or energy")
+                           " energy, or force (the normal force on the whole grid)")
     plot.add_argument("--step", type=int,
                       help="number of the snapshot's row; default: the last snapshot")
     plot.add_argument("--x", metavar="NAME",
-                      help="column along the horizontal axis of --history")
+                      help="column along the horizontal axis of --history, or force")
     plot.set_defaults(call=_plot, error=plot.error)
 
 

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from .history import Grid
     from .result_file import ResultFile
 
-__all__ = ["closure", "energy_terms", "missing_work", "rms_slope", "road_speed", "travel"]
+__all__ = ["closure", "energy_terms", "headline_columns", "missing_work", "normal_force",
+           "rms_slope", "road_speed", "travel"]
 
 FloatArray = NDArray[np.float64]
 
@@ -25,6 +26,25 @@ def rms_slope(grid: Grid, height: FloatArray) -> float:
     modes = np.abs(np.fft.rfft2(height) / height.size) ** 2
     modes[:, 1 : (grid.nx + 1) // 2] *= 2.0
     return float(np.sqrt(np.sum((kx**2 + ky[:, None] ** 2) * modes)))
+
+
+def normal_force(run: ResultFile) -> FloatArray:
+    """Return the normal force on the whole grid, N, one value per row."""
+    return np.asarray(run.history["pressure"], dtype=float) * run.grid.lx * run.grid.ly
+
+
+def headline_columns(run: ResultFile) -> list[tuple[str, FloatArray, str]]:
+    """Return name, values and units of the columns that describe a run in a few numbers.
+
+    In free mode the load is given as a force, because the area of the grid means nothing there.
+    """
+    history = run.history
+    named = [(name, history[name], history.units(name))
+             for name in ("time", "pressure", "contact_area", "friction") if name in history]
+    if run.grid.boundary != "free":
+        return named
+    return [("force", normal_force(run), "N") if column[0] == "pressure" else column
+            for column in named]
 
 
 def travel(run: ResultFile) -> FloatArray | None:

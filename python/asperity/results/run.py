@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from ..base.presenters import present
+from .derived import headline_columns
 from .result_file import ResultFile
 from .snapshot import Snapshots
 from .standing import note_of, rows_of, standing
@@ -133,15 +134,16 @@ class Run(ResultFile):
         """Draw a column of the history, or without a name an overview of the run.
 
         In a run with friction, 'friction' is drawn with its causes, 'contact_area' with the stick
-        area, and 'sliding_speed' with the speed of the road. 'energy' draws the energy balance.
+        area, and 'sliding_speed' with the speed of the road. 'energy' draws the energy balance,
+        and 'force' the normal force on the whole grid.
 
         Parameters
         ----------
         name : str, optional
-            Column to draw, or 'energy'; by default the overview.
+            Column to draw, 'energy' or 'force'; by default the overview.
         x : str, optional
-            Column along the horizontal axis. The default is time or, if no time passes, pressure or
-            step.
+            Column along the horizontal axis, or 'force'. The default is time or, if no time passes,
+            the load or the step.
         ax : matplotlib.axes.Axes, optional
             Axes to draw into; by default a new figure that fits one column of a journal.
         **style
@@ -226,12 +228,9 @@ class Run(ResultFile):
         if note:
             lines.insert(2, f"  {note}")
         if self.history.rows:
-            shown = [(name, self.history[name][-1], self.history.units(name))
-                     for name in ("time", "pressure", "contact_area", "friction")
-                     if name in self.history]
             lines.append("  last row: " + ", ".join(
-                f"{name} {value:.6g}{'' if units == '1' else ' ' + units}"
-                for name, value, units in shown))
+                f"{name} {values[-1]:.6g}{'' if units == '1' else ' ' + units}"
+                for name, values, units in headline_columns(self)))
         return "\n".join(lines)
 
 

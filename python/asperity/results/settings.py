@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from .result_file import ResultFile
 
 __all__ = ["SettingsGroup", "has_adhesion", "has_friction", "has_rough_road", "is_elastic",
-           "parse_settings", "phase_names", "setting", "settings_of", "solver_setting",
-           "steady_phases"]
+           "load_of_phases", "parse_settings", "phase_names", "setting", "settings_of",
+           "solver_setting", "steady_phases"]
 
 # The tokens of `namelist_tokens` in the Fortran library. A string ends on its line, and two quotes
 # in it stand for one.
@@ -164,6 +164,12 @@ def solver_setting(run: ResultFile, name: str) -> float | None:
 def phase_names(run: ResultFile) -> list[str]:
     """Return the names of the phases; a phase without a name has ''."""
     return [group.first("name") or "" for group in settings_of(run) if group.name == "phase"]
+
+
+def load_of_phases(run: ResultFile) -> list[str]:
+    """Return what each phase prescribes: 'pressure', 'force' or 'displacement'; '' if unknown."""
+    return [(group.first("control") or "").lower()
+            for group in settings_of(run) if group.name == "phase"]
 
 
 def steady_phases(run: ResultFile) -> list[int]:

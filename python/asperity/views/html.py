@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.names import counted
+from ..results.derived import headline_columns
 from ..results.standing import note_of, rows_of
 from .style import si_scale, typeset
 
@@ -107,10 +108,8 @@ def run_html(run: Run) -> str:
             ("snapshots", f"{len(steps)}{f' (steps {listed})' if steps else ''}")]
     if note_of(run):
         rows.insert(1, ("", escape(note_of(run))))
-    rows += [(escape(name.replace("_", " ")),
-              f"{shown(history[name][-1], history.units(name))} {curve(history[name])}")
-             for name in ("time", "pressure", "contact_area", "friction")
-             if name in history and history.rows]
+    rows += [(escape(name.replace("_", " ")), f"{shown(values[-1], units)} {curve(values)}")
+             for name, values, units in headline_columns(run) if history.rows]
     if run.warnings:
         rows.append(("warnings", "<br>".join(escape(typeset(line)) for line in run.warnings)))
     return table_html((), rows, f"<b>{escape(run.title or 'untitled run')}</b>"

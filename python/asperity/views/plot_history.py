@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from ..base.names import UnknownNameError, unknown_name
-from ..results.derived import closure, energy_terms, road_speed, travel
+from ..results.derived import closure, energy_terms, normal_force, road_speed, travel
 from ..results.road_slopes import friction_outside
 from ..results.settings import has_adhesion, has_friction
 from ..results.steady import steady_mean, steady_rows, steady_speeds
@@ -45,17 +45,18 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     In a run with friction, 'friction' is drawn with its causes (loss in the rubber, interface, and
     with adhesion the attraction outside the contact), 'contact_area' with the stick area, and
     'sliding_speed' with the speed of the road. 'energy' draws the work put in and the energies that
-    are stored and lost.
+    are stored and lost, and 'force' the normal force on the whole grid.
 
     Parameters
     ----------
     run : Run
         The result.
     name : str
-        Column to draw, or 'energy'.
+        Column to draw, 'energy' or 'force'.
     x : str, optional
-        Column along the horizontal axis. The default is time. If no time passes, it is the sliding
-        speed of a curve of steady states, otherwise pressure or step.
+        Column along the horizontal axis, or 'force'. The default is time. If no time passes, it is
+        the sliding speed of a curve of steady states, otherwise the load (the force in free mode,
+        the pressure in periodic mode) or the step.
     ax : matplotlib.axes.Axes, optional
         Axes to draw into; by default a new figure that fits one column of a journal.
     **style
@@ -72,17 +73,19 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
         If there is no such column.
     """
     history = run.history
-    if name != "energy" and name not in history:
-        raise UnknownNameError(unknown_name("column of the history", name, [*history, "energy"]))
+    if name != "energy":
+        _column(run, name)
     if x is None and name != "sliding_speed" and steady_speeds(run) is not None:
         along, label, log = horizontal(run)
     else:
         if x is None:
-            x = next((column for column in ("time", "pressure", "step")
-                      if column != name and column in history and np.ptp(history[column]) > 0.0),
+            load = "force" if run.grid.boundary == "free" else "pressure"
+            x = next((column for column in ("time", load, "step")
+                      if column != name and np.ptp(_column(run, column)[0]) > 0.0),
                      "step") if history.rows else "step"
-        factor, unit = si_scale(history[x], history.units(x))
-        along, label, log = history[x] * factor, axis_text(label_of(x, history), unit), False
+        values, units = _column(run, x)
+        factor, unit = si_scale(values, units)
+        along, label, log = values * factor, axis_text(label_of(x, history), unit), False
     with print_style() if ax is None else nullcontext():
         axes = ax if ax is not None else _new_axes()
         draw_column(run, name, along, axes, style)
@@ -100,6 +103,16 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     return axes
 
 
+def _column(run: Run, name: str) -> tuple[NDArray[Any], str]:
+    """Return the values and the units of a column of the history, or of the normal force."""
+    if name == "force":
+        return normal_force(run), "N"
+    if name not in run.history:
+        names = [*run.history, "energy", "force"]
+        raise UnknownNameError(unknown_name("column of the history", name, names))
+    return run.history[name], run.history.units(name)
+
+
 def draw_column(run: Run, name: str, along: NDArray[Any], axes: Axes,
                 style: dict[str, Any]) -> None:
     """Draw a column, with related columns, over given values of the horizontal axis."""
@@ -109,8 +122,8 @@ def draw_column(run: Run, name: str, along: NDArray[Any], axes: Axes,
     if name == "energy":
         _draw_energy(run, along, axes, {**marked, **style})
         return
-    values = history[name]
-    factor, unit = si_scale(values, history.units(name))
+    values, units = _column(run, name)
+    factor, unit = si_scale(values, units)
     parts: list[tuple[str, NDArray[Any], str, str]] = []
     label = ""
     if name == "friction" and "friction_viscous" in history and has_friction(run):
@@ -125,7 +138,7 @@ def draw_column(run: Run, name: str, along: NDArray[Any], axes: Axes,
         label = "mean of the interface"
         speed = road_speed(run)
         factor, unit = si_scale([values.max(initial=0.0), speed.max(initial=0.0)],
-                                history.units(name))
+                                units)
         parts = [("road against the block's top", speed, COLOURS[6], ":")]
     axes.plot(along, values * factor, **{"color": COLOURS[0], "label": label or None, **marked,
                                          **style})

@@ -7,8 +7,14 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..results.derived import rms_slope
-from ..results.settings import has_adhesion, has_friction, has_rough_road, is_elastic
+from ..results.derived import normal_force, rms_slope
+from ..results.settings import (
+    has_adhesion,
+    has_friction,
+    has_rough_road,
+    is_elastic,
+    load_of_phases,
+)
 from ..results.steady import steady_speeds
 from .plot_fields import plot_field, plot_section
 from .plot_history import draw_column, horizontal, legend_above, steady_words
@@ -40,9 +46,10 @@ def plot_overview(run: Run) -> Figure:
     over time, and the last maps of pressure and of stick and slip. Without friction they are the
     last maps of pressure and gap, and one of these: contact area (and viscous friction) over time;
     for a growing load, the contact area against the load, with Persson's theory if the road is
-    rough and the material elastic; for a single solve, a section through the contact. A curve of
-    steady states is drawn over the sliding speed. A run whose snapshots have none of these fields,
-    or that has no snapshots, shows its history.
+    rough and the material elastic; for an approach that is prescribed in free mode, such as a
+    pull-off, the normal force against the approach; for a single solve, a section through the
+    contact. A curve of steady states is drawn over the sliding speed. A run whose snapshots have
+    none of these fields, or that has no snapshots, shows its history.
 
     Parameters
     ----------
@@ -74,7 +81,9 @@ def plot_overview(run: Run) -> Figure:
                 plot_field(snapshot, name, panel)
                 panel.set_title(LABELS[name])
         panel = panels[0, -1]
-        if moving:
+        if _is_approach(run):
+            _force_panel(run, panel)
+        elif moving:
             _time_panel(run, panel)
         elif (snapshot is not None and run.history.rows <= 1 and len(names) == 2
               and not _persson_applies(run)):
@@ -137,11 +146,38 @@ def _persson_applies(run: Run) -> bool:
             and is_elastic(run) and not has_adhesion(run))
 
 
-def _load_panel(run: Run, axes: Axes) -> None:
-    """Draw contact area against pressure, with Persson's theory if it applies."""
+def _is_approach(run: Run) -> bool:
+    """Return whether the last phase prescribes an approach that varies, in free mode."""
+    last = run.history["phase"] == run.history["phase"].max(initial=0)
+    return (run.grid.boundary == "free" and load_of_phases(run)[-1:] == ["displacement"]
+            and bool(np.count_nonzero(last) > 1)
+            and float(np.ptp(run.history["displacement"][last])) > 0.0)
+
+
+def _force_panel(run: Run, axes: Axes) -> None:
+    """Draw the normal force against the approach."""
     history = run.history
-    pressure = history["pressure"]
-    factor, unit = si_scale(pressure, "Pa")
+    force = normal_force(run)
+    factor, unit = si_scale(force, "N")
+    along, length = si_scale(history["displacement"], "m")
+    axes.plot(history["displacement"] * along, force * factor, color=COLOURS[0],
+              marker="o" if history.rows <= 40 else "")
+    axes.set_xlabel(axis_text(LABELS["displacement"], length))
+    axes.set_ylabel(axis_text(LABELS["force"], unit))
+    axes.set_title("Force against approach")
+    axes.grid(alpha=0.3)
+
+
+def _load_panel(run: Run, axes: Axes) -> None:
+    """Draw contact area against the load, with Persson's theory if it applies.
+
+    The load is the force in free mode, and the mean pressure in periodic mode.
+    """
+    history = run.history
+    name, pressure, units = "pressure", history["pressure"], "Pa"
+    if run.grid.boundary == "free":
+        name, pressure, units = "force", normal_force(run), "N"
+    factor, unit = si_scale(pressure, units)
     if _persson_applies(run):
         modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
         slope = rms_slope(run.grid, run.height)
@@ -154,7 +190,7 @@ def _load_panel(run: Run, axes: Axes) -> None:
                       label="Persson (2001)")
     axes.plot(pressure * factor, history["contact_area"], color=COLOURS[0], marker="o",
               linestyle="-" if history.rows > 1 else "", label="this run")
-    axes.set_xlabel(axis_text(LABELS["pressure"], unit))
+    axes.set_xlabel(axis_text(LABELS[name], unit))
     axes.set_ylabel(axis_text(LABELS["contact_area"], ""))
     axes.set_xlim(left=min(0.0, 1.05 * pressure.min(initial=0.0) * factor))
     axes.set_ylim(bottom=0.0)

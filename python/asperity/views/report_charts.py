@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results.derived import closure, energy_terms, road_speed
+from ..results.derived import closure, energy_terms, normal_force, road_speed
 from ..results.road_slopes import friction_outside
 from ..results.settings import has_adhesion, has_friction, solver_setting
 from ..results.steady import steady_speeds
@@ -56,6 +56,9 @@ class _Charts:
         self.columns: dict[str, FloatArray] = {name: np.asarray(history[name]) for name in (
             "step", "phase", "time", "pressure", "displacement", "contact_area", "friction")
             if name in history}
+        if run.grid.boundary == "free":
+            del self.columns["pressure"]
+            self.columns["force"] = normal_force(run)
         self.speeds = steady_speeds(run)
         if self.speeds is not None:  # the road has no travel in steady states
             self.columns["speed"] = self.speeds
@@ -108,13 +111,25 @@ class _Charts:
                 lines += self.series("road_speed", "road against the block's top", 6, "2 3",
                                      road_speed(self.run))
             self.chart("time", "sliding_speed", "Sliding speed", "Speed", "m/s", lines)
-        if "pressure" in self.history and np.ptp(self.history["pressure"]) > 1e-6 * np.abs(
-                self.history["pressure"]).max():
-            self.chart("time", "pressure", "Mean pressure", "Pressure", "Pa",
-                       self.series("pressure", "mean pressure", 0))
+        self.add_load()
         self.chart("time", "displacement", "Approach and mean gap", "Length", "m",
                    [*self.series("displacement", "approach", 0),
                     *self.series("mean_gap", "mean gap", 1, "6 3")])
+
+    def add_load(self) -> None:
+        """Add a load that varies: the force in free mode, where the area of the grid means nothing.
+
+        In periodic mode it is the mean pressure.
+        """
+        load = self.history["pressure"]
+        if not len(load) or np.ptp(load) <= 1e-6 * np.abs(load).max():
+            return
+        if self.run.grid.boundary == "free":
+            self.chart("time", "force", "Normal force", "Force", "N",
+                       self.series("force", "normal force", 0, values=self.columns["force"]))
+        else:
+            self.chart("time", "pressure", "Mean pressure", "Pressure", "Pa",
+                       self.series("pressure", "mean pressure", 0))
 
     def add_energy(self) -> None:
         """Add work, energies stored and lost, and the error of the balance."""

@@ -98,7 +98,8 @@ def _numbers(values: NDArray[Any]) -> list[float | int | None]:
 def _axes(run: Run, columns: dict[str, FloatArray]) -> list[dict[str, Any]]:
     """Return the choices of the horizontal axis of the charts; the default is first."""
     named = {"speed": ("Sliding speed", "m/s"), "time": ("Time", "s"),
-             "travel": ("Travel of the road", "m"), "pressure": ("Mean pressure", "Pa"),
+             "travel": ("Travel of the road", "m"), "force": ("Normal force", "N"),
+             "pressure": ("Mean pressure", "Pa"),
              "displacement": ("Approach", "m"), "step": ("Step", "1")}
     order = list(named)
     if travel(run) is not None:
