@@ -33,6 +33,7 @@ contains
       if (selected('materials_of_arms_and_branches')) call materials_of_arms_and_branches()
       if (selected('each_fault_has_its_message')) call each_fault_has_its_message()
       if (selected('very_many_rows_are_warned_of')) call very_many_rows_are_warned_of()
+      if (selected('loads_beyond_the_modulus_are_warned_of')) call loads_beyond_the_modulus_are_warned_of()
       if (selected('all_faults_are_reported_at_once')) call all_faults_are_reported_at_once()
       if (selected('files_that_exist_or_not')) call files_that_exist_or_not()
       if (selected('options_that_exclude_each_other')) call options_that_exclude_each_other()
@@ -481,6 +482,29 @@ contains
       call check_order(index(case%warnings, '&phase 2: the run has 100001 rows, of which 60000 belong to this phase '// &
          '(time step: steps given'), '>', 0, 'a warning: '//case%warnings)
    end subroutine very_many_rows_are_warned_of
+
+   !> A load above ten times the modulus under a sudden load, 2 (1e6 + 4e6)/(1 - 0.5) = 20 MPa, is warned of; a force
+   !> counts as its mean pressure.
+   subroutine loads_beyond_the_modulus_are_warned_of()
+      type(case_type) :: case
+      type(error_type), allocatable :: error
+      character(*), parameter :: rubber = '&material shear_modulus = 1e6, prony_g = 4e6, prony_tau = 1, poisson = 0.5 /'
+      character(*), parameter :: most = '&phase pressure = 1.99e8 /'
+
+      call parse_case(grid//sphere//rubber//most, 'road.nml', case, error)
+      call check_no_error(error, 'a large load')
+      call check_that(index(case%warnings, 'modulus') == 0, 'no warning about it '//case%warnings)
+
+      call parse_case(grid//sphere//rubber//most//'&phase pressure = 4e9 /', 'road.nml', case, error)
+      call check_no_error(error, 'a load in another unit')
+      call check_order(index(case%warnings, '&phase 2: the mean pressure of 4e9 Pa is 200 times the modulus E* of 2e7 Pa'), &
+         '>', 0, 'a warning: '//case%warnings)
+
+      call parse_case(grid//sphere//rubber//'&phase force = 8e3 /', 'road.nml', case, error)
+      call check_no_error(error, 'a force in another unit')
+      call check_order(index(case%warnings, '&phase 1: the mean pressure of 4e9 Pa'), '>', 0, &
+         'a warning: '//case%warnings)
+   end subroutine loads_beyond_the_modulus_are_warned_of
 
    !> An input must give exactly one fault, which holds the fragment.
    subroutine refuse(text, fragment)

@@ -1195,19 +1195,29 @@ def test_each_road_may_have_its_own_unit_and_size(tmp_path, monkeypatch, capsys)
     one, *_ = road_of(["a.txt:size=1000x1000", "b.txt:size=1x0.67,unit=mm"], cells=32,
                       unit="um")._maps
     assert one.lx == 1e-3
+    turned, whole = road_of(["b.txt:unit=mm,size=0.6666666667x1,transpose=yes",
+                             "a.txt:unit=um,size=1000x1000,periodic=as-is"], cells=32)._maps
+    np.testing.assert_allclose(turned.height, second.height.T, rtol=1e-9, atol=1e-18)
+    assert whole.periodic and not first.periodic
 
     for words, message in (
             (["a.txt", "b.txt"], "names no unit of length: give one .*; unit and size .* count"),
             (["a.txt:size=1000x1000", "c.h5", "--unit", "um"],
              "unit = 'um': c.h5 has its own unit, 'm'.* give a road its own, as ROAD:unit=um"),
             (["a.txt:units=um"], "'units=um': must be NAME=VALUE, NAME one of unit, size, channel"),
-            (["a.txt:unit=um,size=1000"], "size: has 1 lengths, must have 2"),
+            (["a.txt:transpose=1"], "transpose = '1': must be yes or no"),
+            (["a.txt:periodic=hann"], "periodic = 'hann': must be as-is, for a map whose opposite"),
+            (["a.txt:unit=um,size=1000"], "size: has 1 length, must have 2"),
             (["a.txt:unit=um,size=axb"], "size = 'axb': must be two lengths, as 4000x3000"),
             ([own[0], "a.txt:unit=um,size=10x10"], "a.txt:unit=um,size=10x10 is given twice")):
         assert main(["friction", *words, "--material", "r.nml", "--cells", "32", "--plan"]) == 2
         assert re.search(message, capsys.readouterr().err), message
     assert main(["friction", *own, "--material", "r.nml", "--cells", "32", "-o", "a.txt"]) == 2
     assert main(["friction", *own, "--material", "r.nml", "--cells", "32", "--plan"]) == 0
+    printed = capsys.readouterr().out
+    assert "maps       a.txt: 96 x 96 cells, 0.001 x 0.001 m\n" in printed
+    assert "           b.txt: 96 x 64 cells, 0.001 x 0.0006667 m\n" in printed
+    assert "           c.h5: 96 x 96 cells, 0.001 x 0.001 m\n" in printed
 
 
 def test_outliers_of_profiles(tmp_path, monkeypatch, capsys):

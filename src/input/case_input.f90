@@ -18,7 +18,7 @@ module case_input
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use shear_laws, only : law_uses, law_variables
    use snapshot_fields, only : field_names, field_needs_friction
-   use scale_warnings, only : cap_warning, oblong_warning, rows_warning, steepness_warning
+   use scale_warnings, only : cap_warning, load_warning, oblong_warning, rows_warning, steepness_warning
    use surface_warnings, only : find_warnings, warning_length
    use asperity_text_file, only : read_text_file
    use text_tools, only : to_text
@@ -121,6 +121,7 @@ contains
       end if
       call add_warning(case, oblong_warning(case%grid))
       call add_warning(case, rows_warning(case%phases))
+      call add_warning(case, load_warning(case%phases, case%material, case%grid))
       do i = 1, size(case%surfaces)
          call add_warning(case, steepness_warning(case%surfaces(i)))
          call add_warning(case, cap_warning(case%surfaces(i), case%grid))

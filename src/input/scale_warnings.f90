@@ -1,9 +1,10 @@
 !> Warnings about values that do not fit together, for example because one is given in another unit: very oblong
-!> cells, very steep roads, spheres smaller than the cells, and phases with very many steps.
+!> cells, very steep roads, spheres smaller than the cells, loads beyond any stiffness of the solid, and phases with
+!> very many steps.
 module scale_warnings
    use asperity_precision, only : dp, pi
    use asperity_schedule, only : count_rows
-   use case_settings, only : phase_settings_type
+   use case_settings, only : material_settings_type, phase_settings_type
    use regular_grid, only : grid_type
    use surface_settings, only : surface_settings_type
    use surface_shapes, only : find_shape, shape_type
@@ -12,10 +13,11 @@ module scale_warnings
    implicit none
    private
 
-   public :: cap_warning, oblong_warning, rows_warning, steepness_warning
+   public :: cap_warning, load_warning, oblong_warning, rows_warning, steepness_warning
 
    real(dp), parameter :: largest_aspect = 100.0_dp   !! of a cell: beyond it a length is often wrong
    real(dp), parameter :: least_radius = 4.0_dp       !! of a cap, cells: below it no contact on the cap is resolved
+   real(dp), parameter :: largest_load = 10.0_dp      !! mean pressure over the modulus E* of the stiffest solid
    integer, parameter :: many_rows = 100000           !! of a run: above it a mistake is costly
 
 contains
@@ -76,6 +78,31 @@ contains
          ' m, is less than four cells of '//rounded_text(side, 4)//' m: the road is a spike on a plane; check the '// &
          'units, or use smaller cells'
    end function cap_warning
+
+   !> A warning about the first phase whose mean pressure is far above the modulus E* of the solid under a sudden load.
+   !> Its strain would be much larger than 1. Empty if all is well.
+   pure function load_warning(phases, material, grid) result(text)
+      type(phase_settings_type), intent(in) :: phases(:)  !! resolved
+      type(material_settings_type), intent(in) :: material
+      type(grid_type), intent(in) :: grid
+      character(:), allocatable :: text
+      real(dp) :: modulus, pressure
+      integer :: k
+
+      text = ''
+      modulus = 2.0_dp*(material%shear_modulus + sum(material%prony_g))/(1.0_dp - material%poisson)
+      do k = 1, size(phases)
+         if (phases(k)%control == 'displacement') cycle
+         pressure = abs(phases(k)%target)
+         if (phases(k)%control == 'force') pressure = pressure/(grid%lx*grid%ly)
+         if (.not. pressure > largest_load*modulus) cycle
+         text = '&phase '//to_text(k)//': the mean pressure of '//rounded_text(pressure, 3)//' Pa is '// &
+            rounded_text(pressure/modulus, 3)//' times the modulus E* of '//rounded_text(modulus, 3)// &
+            ' Pa that the solid has under a sudden load, but the solid is linear, which holds for small strains '// &
+            'only: check the units of the load and of the moduli'
+         return
+      end do
+   end function load_warning
 
    !> A warning if a run has so many rows that the user should know before it starts. Empty if all is well.
    pure function rows_warning(phases) result(text)

@@ -73,7 +73,8 @@ def add_friction(verbs: Any) -> None:
                     " interruption the same command resumes where it stopped.")
     parser.add_argument("roads", metavar="ROAD", nargs="+",
                         help="a height map in any format that `import` reads, as FILE or with"
-                             " options for this file, FILE:unit=um,size=4000x3000,channel=NAME;"
+                             " options for this file, FILE:unit=um,size=4000x3000,channel=NAME,"
+                             "transpose=yes,periodic=as-is;"
                              " spectrum:FILE; or"
                              " self_affine:NAME=VALUE,... with hurst, wavelength_long,"
                              " wavelength_short, and rms_slope or rms_height")

@@ -203,6 +203,10 @@ class CurvePlan:
             " processors have nothing else to do",
             f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
         ]
+        maps = [f"{name}: {nx} x {ny} cells, {lx:.4g} x {ly:.4g} m"
+                for name, nx, ny, lx, ly in road.maps]
+        lines[1:1] = [f"{head:11}{line}" for head, line in zip(
+            ["maps", *[""] * len(maps)], maps, strict=False)]
         return "\n".join([*lines, *(f"note       {note}" for note in self.all_notes)])
 
 

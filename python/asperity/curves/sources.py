@@ -29,7 +29,7 @@ __all__ = ["compound_of", "file_of_road", "road_of"]
 
 Road = DrawnRoad | MeasuredRoad
 
-_OWN = ("unit", "size", "channel")  # options that may follow the name of a road
+_OWN = ("unit", "size", "channel", "transpose", "periodic")  # they may follow the name of a road
 _SELF_AFFINE = ("hurst", "wavelength_long", "wavelength_rolloff", "wavelength_short", "rms_height",
                 "rms_slope")
 
@@ -53,9 +53,9 @@ def road_of(
     sources : sequence of str, Path, MeasuredSurface or Spectrum
         Each source is one of these. A measured map in any format that `asperity.surface.load`
         reads: patches are cut from it. Options of this file alone may follow its name, as in
-        ``"plate.csv:unit=um,size=4000x3000,channel=Height"``. A profile: it stands for the
-        isotropic road with such profiles. ``"spectrum:FILE"``: a table of wave numbers (rad/m) and
-        densities.
+        ``"plate.csv:unit=um,size=4000x3000,channel=Height,transpose=yes,periodic=as-is"``. A
+        profile: it stands for the isotropic road with such profiles. ``"spectrum:FILE"``: a table
+        of wave numbers (rad/m) and densities.
         ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``.
         Spectra and profiles are combined into one spectrum.
     cells : int
@@ -189,6 +189,13 @@ def _own_options(words: str) -> tuple[str, dict[str, Any]]:
             raise ValueError(f"{words}: size = {options['size']!r}: must be two lengths, as"
                              " 4000x3000, or one for a profile")
         options["size"] = [float(length) for length in lengths]
+    if "transpose" in options:
+        if options["transpose"] not in ("yes", "no"):
+            raise ValueError(f"{words}: transpose = {options['transpose']!r}: must be yes or no")
+        options["transpose"] = options["transpose"] == "yes"
+    if options.get("periodic", "as-is") != "as-is":
+        raise ValueError(f"{words}: periodic = {options['periodic']!r}: must be as-is, for a map"
+                         " whose opposite edges match")
     return file, options
 
 

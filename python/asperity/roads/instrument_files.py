@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, positive
+from ..base.names import counted
 from ..base.tables import text_of
 from .grid_files import esri_grid
 from .map_files import own_map, text_map, text_table, unit_of_dataset
@@ -398,5 +399,5 @@ def _size_of(path: Path, dim: int, size: Any, transpose: bool) -> tuple[float, .
         raise ValueError(f"{path}: gives no lengths: give them (size = (lx, ly), --size LX LY)")
     values = [positive("size", value) for value in np.atleast_1d(np.asarray(size, dtype=object))]
     if len(values) != dim:
-        raise ValueError(f"size: has {len(values)} lengths, must have {dim}")
+        raise ValueError(f"size: has {counted(len(values), 'length')}, must have {dim}")
     return tuple(reversed(values)) if transpose else tuple(values)

@@ -229,6 +229,7 @@ class DrawnRoad:
     is_measured = False
     join = "none"
     count: int | None = None    # number of patches; None: any number can be drawn
+    maps: Sequence[tuple[str, int, int, float, float]] = ()     # it has no measured maps
 
     def __init__(self, spectrum: Spectrum, cells: int, side: float | None = None,
                  short: float | None = None, seed: int = 1) -> None:
@@ -341,6 +342,12 @@ class MeasuredRoad:
     def name(self) -> str:
         """Name of the road."""
         return name_of_several(str(one.source.get("name", "map")) for one in self._maps)
+
+    @property
+    def maps(self) -> Sequence[tuple[str, int, int, float, float]]:
+        """Name, cells along x and y, and lengths along x and y in m of each map."""
+        return [(str(one.source.get("name", "map")), one.height.shape[1], one.height.shape[0],
+                 one.lx, one.ly) for one in self._maps]
 
     def patch(self, number: int) -> Patch:
         """Return a patch.
