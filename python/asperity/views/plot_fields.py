@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 __all__ = ["frame_of", "plot_field", "plot_section", "stretch_of", "write_lengths"]
 
 ARROWS = 22  # along the longer side
+_MOST_UPRIGHT = 3.0  # ratio of the height of a map to its width up to which labels lie below it
 _MOST_OBLONG = 8.0  # ratio of the sides of a map up to which both have the same scale
 
 
@@ -192,9 +193,16 @@ def write_lengths(axes: Axes, unit: str, stretch: float) -> None:
         more = f"; y is stretched {stretch:.3g} times"
     elif stretch < 1.0:
         more = f", stretched {1.0 / stretch:.3g} times"
+    if _is_narrow(axes, stretch):
         axes.tick_params(axis="x", labelrotation=90)  # the axis is too short for labels in a row
     axes.set_xlabel(f"x ({unit}){more}")
     axes.set_ylabel(f"y ({unit})")
+
+
+def _is_narrow(axes: Axes, stretch: float) -> bool:
+    """Return whether a map is so narrow that the labels of its x axis must stand upright."""
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    return stretch * (high - low) > _MOST_UPRIGHT * (right - left)
 
 
 def _bar_lies(text: str, ratio: float, width: float) -> bool:
@@ -219,7 +227,7 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
     ratio = float(np.clip(grid.ly / grid.lx, 0.25, 2.5))
     text = axis_text(label, unit)
     # A bar beside the map is as tall as the map, which limits the length of its label.
-    width = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
+    width = axes.get_position(original=True).width * axes.figure.bbox.width / axes.figure.dpi
     lies = _bar_lies(text, ratio, width)
     bar = axes.figure.colorbar(image, ax=axes, extend=extend,
                                **({"orientation": "horizontal", "pad": 0.12} if lies
@@ -253,7 +261,8 @@ def _contact_map(snapshot: Snapshot, contact: NDArray[Any], axes: Axes) -> None:
     axes.set_ylim(low, high)
     write_lengths(axes, unit, stretch)
     # Labels of ticks that stand upright are about three times as tall.
-    _state_legend(axes, colours, names, 2.0 * plt.rcParams["font.size"] if stretch < 1.0 else 0.0)
+    _state_legend(axes, colours, names, 2.0 * plt.rcParams["font.size"] if _is_narrow(axes, stretch)
+                  else 0.0)
 
 
 def _state_legend(axes: Axes, colours: list[str], names: list[str], more: float = 0.0) -> None:
