@@ -76,7 +76,10 @@ contains
       text = text//joint_note(case)
       if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
          ': '//memory_text(limit)//nl
-      text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'//nl
+      text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'
+      if (case%friction%law /= 'none' .and. case%friction%slope_effect) text = text//'; rows on steep roads may take '// &
+         'ten times as long'
+      text = text//nl
       text = text//marked('! ', adhesion_notes(case))// &
          marked('! note: ', footprint_note(case))//marked('! warning: ', case%warnings)
    end function case_summary
