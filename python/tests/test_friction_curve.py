@@ -533,7 +533,11 @@ def test_losses_are_the_power(curve, tmp_path):
     """By octaves and by arms the sum is the same; without friction it is the whole loss."""
     octave = curve.losses["loss_octave"].sum(axis=-1)
     np.testing.assert_allclose(octave, curve.losses["loss_arm"].sum(axis=-1), rtol=1e-9)
-    # With friction, tangential waves lose energy, too, which friction_viscous does not contain.
+    power = (curve.values["friction_loss"].mean(axis=3) * curve.pressure[:, None, None]
+             * curve.speed)
+    np.testing.assert_allclose(octave, power, rtol=1e-9)
+    # With friction, friction_viscous contains no loss of tangential waves, but the work of the
+    # pressure that the tangential displacement moves along the slopes.
     curve = curve_of(small_plan(coefficient=0.0), tmp_path)
     octave = curve.losses["loss_octave"].sum(axis=-1)
     power = (curve.values["friction_viscous"].mean(axis=3) * curve.pressure[:, None, None]
@@ -552,7 +556,7 @@ def test_contribution_of_waves_that_are_left_out(curve):
 def test_picture(curve, tmp_path):
     figure = curve.plot()
     labels = [panel.get_ylabel() for panel in figure.axes]
-    assert labels == ["friction coefficient", "viscous friction coefficient",
+    assert labels == ["friction coefficient", "friction by loss in the rubber",
                       "contact area fraction"]
     # The legend must be beside the panels, where it hides no curve.
     assert not any(panel.get_legend() for panel in figure.axes)
@@ -621,7 +625,7 @@ def test_a_single_point_shows_its_interval_and_the_theory(curve):
     panel = figure.axes[1]
     (bar,) = panel.collections
     ((low, high),) = [segment[:, 1] for segment in bar.get_segments()]
-    assert [low, high] == [end.item() for end in one.mean("friction_viscous")[1:]]
+    assert [low, high] == [end.item() for end in one.mean("friction_loss")[1:]]
     (persson,) = (line for line in panel.lines if line.get_marker() == "_")
     assert persson.get_ydata() == theory["friction_persson"].ravel()
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
@@ -677,9 +681,9 @@ def test_marks_on_the_page(curve, tmp_path):
         browser.open(page)
         counts = ("return ['circle', 'path'].map((kind) =>"
                   " document.querySelectorAll(`#curves ${kind}.flag`).length)")
-        assert browser.run(counts) == [5, 5]  # one in each chart
+        assert browser.run(counts) == [6, 6]  # one in each chart
         texts, _ = browser.saved()
-        assert sum("warnings" in text.splitlines()[0] and "[2]" in text for text in texts) == 5
+        assert sum("warnings" in text.splitlines()[0] and "[2]" in text for text in texts) == 6
         told = "return document.getElementById('point-warnings').textContent"
         assert browser.run(told) == ""
         browser.run("const place = document.getElementById('choose-speed'); place.value = '0';"
@@ -737,7 +741,7 @@ def test_page_in_a_browser(curve, tmp_path):
         counted = browser.run("return [document.querySelectorAll('#curves figure').length,"
                               " document.querySelectorAll('#losses figure').length,"
                               " document.querySelectorAll('#map canvas').length]")
-        assert counted == [5, len(curve.losses), 1]
+        assert counted == [6, len(curve.losses), 1]
         texts, pictures = browser.saved()
         assert len(texts) == len(pictures) == sum(counted)
         (field,) = (text for text in texts if text.startswith("x (m),y (m),Pressure"))

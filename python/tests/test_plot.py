@@ -165,9 +165,9 @@ def test_friction_is_split_into_its_causes(frictional):
     axes = run.plot("friction")
     lines = {line.get_label(): line.get_ydata() for line in axes.lines}
     np.testing.assert_allclose(lines["whole"], run.history["friction"])
-    np.testing.assert_allclose(lines["loss in the rubber"], run.history["friction_viscous"])
-    np.testing.assert_allclose(lines["loss in the rubber"] + lines["interface"], lines["whole"])
-    assert legend_of(axes)[:3] == ["whole", "loss in the rubber", "interface"]
+    np.testing.assert_allclose(lines["pressure on slopes"], run.history["friction_viscous"])
+    np.testing.assert_allclose(lines["pressure on slopes"] + lines["interface"], lines["whole"])
+    assert legend_of(axes)[:3] == ["whole", "pressure on slopes", "interface"]
 
 
 def test_attraction_outside_the_contact(tmp_path):

@@ -35,7 +35,7 @@ def add_plot(verbs: Any) -> None:
                       help="make a film of a field over all snapshots (.gif, or .mp4 with ffmpeg);"
                            " the default is stick and slip, or without friction the pressure")
     what.add_argument("--history", metavar="NAME",
-                      help="draw a column of the history, for example friction (with its causes),"
+                      help="draw a column of the history, for example friction (with its parts),"
                            " energy, or force (the normal force on the whole grid)")
     plot.add_argument("--step", type=int,
                       help="number of the snapshot's row; default: the last snapshot")

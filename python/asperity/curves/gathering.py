@@ -50,7 +50,8 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
     FrictionCurve
     """
     axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
-    values = {name: np.full((*axes, plan.patches), math.nan) for name in _NAMES}
+    values = {name: np.full((*axes, plan.patches), math.nan)
+              for name in (*_NAMES, "friction_loss")}
     sources: dict[tuple[int, int, int], tuple[Path, int]] = {}
     lost: list[tuple[Piece, int, Run]] = []
     for piece, _ in pieces:
@@ -59,6 +60,8 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
             at = (piece.i, piece.j, piece.first + row)
             for name in _NAMES:
                 values[name][(*at, piece.patch)] = run.history[name][row]
+            work = plan.pressure[at[0]] * run.grid.lx * run.grid.ly * plan.speed[at[2]]
+            values["friction_loss"][(*at, piece.patch)] = run.history["power_viscous"][row] / work
             if piece.patch == 0:
                 sources[at] = (piece.job.path, int(run.history["step"][row]))
         lost.append((piece, rows, run))

@@ -38,7 +38,8 @@ MEANINGS = {
     "temperature": ("degC", "temperature of the rubber"),
     "speed": ("m/s", "speed of the road"),
     "friction": ("1", "friction coefficient"),
-    "friction_viscous": ("1", "friction by loss in the rubber"),
+    "friction_viscous": ("1", "friction by the pressure on the slopes of the road"),
+    "friction_loss": ("1", "friction by loss in the rubber"),
     "friction_interface": ("1", "friction by the traction in the interface"),
     "contact_area": ("1", "contact area over the apparent one"),
     "mean_gap": ("m", "mean gap"),
@@ -105,8 +106,9 @@ class FrictionCurve:
     patches : list of str
         Origin of each patch.
     values : dict of ndarray, shape (pressure, temperature, speed, patch)
-        'friction', 'friction_viscous', 'friction_interface', 'contact_area', 'mean_gap'; NaN where
-        a solver did not converge.
+        'friction', its two parts 'friction_viscous' (pressure on the slopes of the road) and
+        'friction_interface' (traction in the interface), 'friction_loss' (power lost in the rubber
+        over load and speed), 'contact_area', 'mean_gap'; NaN where a solver did not converge.
     theory : dict of ndarray, shape (pressure, temperature, speed)
         'friction_persson', 'area_persson', 'friction_left_out'.
     losses : dict of ndarray, shape (pressure, temperature, speed, parts)

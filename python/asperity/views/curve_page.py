@@ -32,7 +32,8 @@ _SIDES = (192, 128, 96, 64, 48, 32)
 # Of the settings. The curve is extended to a wavelength, or not at all.
 _UNITS = {"lx": " m", "ly": " m", "shortest_wave": " m", "extended_to": " m", "angle": "°"}
 
-_NAMES = {"friction": "friction", "friction_viscous": "viscous", "friction_interface": "interface",
+_NAMES = {"friction": "friction", "friction_viscous": "slopes", "friction_interface": "interface",
+          "friction_loss": "loss",
           "contact_area": "contact area", "mean_gap": "mean gap",
           "friction_persson": "Persson", "area_persson": "Persson"}
 
@@ -143,8 +144,8 @@ def _data(curve: FrictionCurve) -> dict[str, Any]:
         values |= {name: _numbers(mean), f"{name}_low": _numbers(low),
                    f"{name}_high": _numbers(high)}
     if not float(curve.settings.get("coefficient", 0.0)):
-        for name in ("friction_viscous", "friction_interface"):
-            values.pop(name, None)  # all friction is viscous
+        for name in ("friction_viscous", "friction_interface", "friction_loss"):
+            values.pop(name, None)  # all friction is loss in the rubber
     values |= {name: _numbers(array) for name, array in curve.theory.items()}
     maps, grid = _maps(curve)
     return {

@@ -57,10 +57,10 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     dashes = "_" if alone else "--"
     with print_style():
         panels = [("friction", "", "friction coefficient"),
-                  ("friction_viscous", "friction_persson", "viscous friction coefficient"),
+                  ("friction_loss", "friction_persson", "friction by loss in the rubber"),
                   ("contact_area", "area_persson", "contact area fraction")]
         if not float(curve.settings.get("coefficient", 0.0)):
-            panels = panels[1:]  # without friction in the interface all of it is viscous
+            panels = panels[1:]  # without friction in the interface all of it is loss in the rubber
         others = [name for name in order if name != along]
         combinations = list(np.ndindex(*(axes[name].size for name in others)))
         rows = -(-(len(combinations) + _MOST_KEYS) // _LEGEND_COLUMNS)

@@ -34,18 +34,20 @@ if TYPE_CHECKING:
 __all__ = ["draw_column", "horizontal", "legend_above", "plot_history", "steady_words"]
 
 # Colours and line styles of the parts of friction and of energy.
-PARTS = {"viscous": (COLOURS[1], "--"), "interface": (COLOURS[2], "-."),
-         "stored": (COLOURS[0], "-"), "friction": (COLOURS[2], "-."), "work": (COLOURS[6], "-")}
+PARTS = {"slopes": (COLOURS[1], "--"), "interface": (COLOURS[2], "-."),
+         "viscous": (COLOURS[1], "--"), "stored": (COLOURS[0], "-"),
+         "friction": (COLOURS[2], "-."), "work": (COLOURS[6], "-")}
 
 
 def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
                  ax: Axes | None = None, **style: Any) -> Axes:
     """Draw a column of the history against another one.
 
-    In a run with friction, 'friction' is drawn with its causes (loss in the rubber, interface, and
-    with adhesion the attraction outside the contact), 'contact_area' with the stick area, and
-    'sliding_speed' with the speed of the road. 'energy' draws the work put in and the energies that
-    are stored and lost, and 'force' the normal force on the whole grid.
+    In a run with friction, 'friction' is drawn with its parts (pressure on the slopes of the road,
+    traction in the interface, and with adhesion the attraction outside the contact),
+    'contact_area' with the stick area, and 'sliding_speed' with the speed of the road. 'energy'
+    draws the work put in and the energies that are stored and lost, and 'force' the normal force on
+    the whole grid.
 
     Parameters
     ----------
@@ -128,9 +130,9 @@ def draw_column(run: Run, name: str, along: NDArray[Any], axes: Axes,
     label = ""
     if name == "friction" and "friction_viscous" in history and has_friction(run):
         label = "whole"
-        viscous = history["friction_viscous"]
-        parts = [("loss in the rubber", viscous, *PARTS["viscous"]),
-                 ("interface", values - viscous, *PARTS["interface"])]
+        slopes = history["friction_viscous"]
+        parts = [("pressure on slopes", slopes, *PARTS["slopes"]),
+                 ("interface", values - slopes, *PARTS["interface"])]
     elif name == "contact_area" and "stick_area" in history and has_friction(run):
         label = "in contact"
         parts = [("sticking", history["stick_area"], COLOURS[4], "--")]

@@ -166,7 +166,7 @@ def _tiles(run: Run) -> str:
     if moving:
         names.append(("friction", "Friction"))
         if "friction_viscous" in history and has_friction(run):
-            names.append(("friction_viscous", "of it in the rubber"))
+            names.append(("friction_viscous", "of it by pressure on slopes"))
     if has_friction(run):
         names += [("stick_area", "Stick area"), ("sliding_speed", "Sliding speed")]
     elif steady_rows(run)[-1]:

@@ -88,7 +88,7 @@ class _Charts:
             return
         lines = self.series("friction", "whole" if self.rubbing else "friction", 0)
         if self.rubbing and "friction_viscous" in history:
-            lines += self.series("friction_viscous", "loss in the rubber", 1, "6 3")
+            lines += self.series("friction_viscous", "pressure on slopes", 1, "6 3")
             lines += self.series("friction_interface", "interface", 2, "8 3 2 3",
                                  history["friction"] - history["friction_viscous"])
         if has_adhesion(self.run) and len(self.run.snapshots) <= MOST_SNAPSHOTS:

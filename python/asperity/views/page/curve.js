@@ -161,11 +161,13 @@ function choose(x, number) {
 
 const CHARTS = [
   {name: "friction", title: "Friction", label: "Friction coefficient", unit: "1", band: true,
-    theory: data.values.friction_viscous ? null : "friction_persson", zero: true},
-  {name: "friction_viscous", title: "Friction by loss in the rubber", label: "Friction coefficient",
+    theory: data.values.friction_loss ? null : "friction_persson", zero: true},
+  {name: "friction_loss", title: "Friction by loss in the rubber", label: "Friction coefficient",
     unit: "1", band: true, theory: "friction_persson", zero: true},
-  {name: "friction_interface", title: "Friction of the interface", label: "Friction coefficient",
-    unit: "1", band: true, zero: true},
+  {name: "friction_viscous", title: "Friction by pressure on the slopes",
+    label: "Friction coefficient", unit: "1", band: true, zero: true},
+  {name: "friction_interface", title: "Friction by traction in the interface",
+    label: "Friction coefficient", unit: "1", band: true, zero: true},
   {name: "contact_area", title: "Contact area", label: "Fraction", unit: "1", band: true, log: true,
     theory: "area_persson"},
   {name: "mean_gap", title: "Mean gap", label: "Gap", unit: "m", band: true},
