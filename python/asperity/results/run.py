@@ -133,7 +133,7 @@ class Run(ResultFile):
              **style: Any) -> Axes | Figure:
         """Draw a column of the history, or without a name an overview of the run.
 
-        In a run with friction, 'friction' is drawn with its causes, 'contact_area' with the stick
+        In a run with friction, 'friction' is drawn with its parts, 'contact_area' with the stick
         area, and 'sliding_speed' with the speed of the road. 'energy' draws the energy balance,
         and 'force' the normal force on the whole grid.
 

@@ -1,4 +1,4 @@
-"""Pictures of histories: a column with its causes, energies; axes that other pictures share."""
+"""Pictures of histories: a column with its parts, energies; axes that other pictures share."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ __all__ = ["plot_overview"]
 def plot_overview(run: Run) -> Figure:
     """Draw the most informative quantities of a run.
 
-    With friction these are friction with its causes, contact area, stick area and sliding speed
+    With friction these are friction with its parts, contact area, stick area and sliding speed
     over time, and the last maps of pressure and of stick and slip. Without friction they are the
     last maps of pressure and gap, and one of these: contact area (and viscous friction) over time;
     for a growing load, the contact area against the load, with Persson's theory if the road is
