@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.names import UnknownNameError, unknown_name
 from .steady import steady_rows
 
 if TYPE_CHECKING:
     from .history import Grid
     from .result_file import ResultFile
 
-__all__ = ["closure", "energy_terms", "headline_columns", "missing_work", "normal_force",
-           "rms_slope", "road_speed", "travel"]
+__all__ = ["closure", "column_of", "energy_terms", "headline_columns", "missing_work",
+           "normal_force", "rms_slope", "road_speed", "travel"]
 
 FloatArray = NDArray[np.float64]
 
@@ -31,6 +32,22 @@ def rms_slope(grid: Grid, height: FloatArray) -> float:
 def normal_force(run: ResultFile) -> FloatArray:
     """Return the normal force on the whole grid, N, one value per row."""
     return np.asarray(run.history["pressure"], dtype=float) * run.grid.lx * run.grid.ly
+
+
+def column_of(run: ResultFile, name: str) -> tuple[NDArray[Any], str]:
+    """Return the values and the units of a column of the history, or of the normal force, 'force'.
+
+    Raises
+    ------
+    KeyError
+        If there is no such column.
+    """
+    if name == "force":
+        return normal_force(run), "N"
+    if name not in run.history:
+        names = [*run.history, "energy", "force"]
+        raise UnknownNameError(unknown_name("column of the history", name, names))
+    return run.history[name], run.history.units(name)
 
 
 def headline_columns(run: ResultFile) -> list[tuple[str, FloatArray, str]]:

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ..base.names import UnknownNameError, unknown_name
-from ..results.derived import closure, energy_terms, normal_force, road_speed, travel
+from ..results.derived import closure, column_of, energy_terms, road_speed, travel
 from ..results.road_slopes import friction_outside
 from ..results.settings import has_adhesion, has_friction
 from ..results.steady import steady_mean, steady_rows, steady_speeds
@@ -76,16 +75,16 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     """
     history = run.history
     if name != "energy":
-        _column(run, name)
+        column_of(run, name)
     if x is None and name != "sliding_speed" and steady_speeds(run) is not None:
         along, label, log = horizontal(run)
     else:
         if x is None:
             load = "force" if run.grid.boundary == "free" else "pressure"
             x = next((column for column in ("time", load, "step")
-                      if column != name and np.ptp(_column(run, column)[0]) > 0.0),
+                      if column != name and np.ptp(column_of(run, column)[0]) > 0.0),
                      "step") if history.rows else "step"
-        values, units = _column(run, x)
+        values, units = column_of(run, x)
         factor, unit = si_scale(values, units)
         along, label, log = values * factor, axis_text(label_of(x, history), unit), False
     with print_style() if ax is None else nullcontext():
@@ -105,16 +104,6 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
     return axes
 
 
-def _column(run: Run, name: str) -> tuple[NDArray[Any], str]:
-    """Return the values and the units of a column of the history, or of the normal force."""
-    if name == "force":
-        return normal_force(run), "N"
-    if name not in run.history:
-        names = [*run.history, "energy", "force"]
-        raise UnknownNameError(unknown_name("column of the history", name, names))
-    return run.history[name], run.history.units(name)
-
-
 def draw_column(run: Run, name: str, along: NDArray[Any], axes: Axes,
                 style: dict[str, Any]) -> None:
     """Draw a column, with related columns, over given values of the horizontal axis."""
@@ -124,7 +113,7 @@ def draw_column(run: Run, name: str, along: NDArray[Any], axes: Axes,
     if name == "energy":
         _draw_energy(run, along, axes, {**marked, **style})
         return
-    values, units = _column(run, name)
+    values, units = column_of(run, name)
     factor, unit = si_scale(values, units)
     parts: list[tuple[str, NDArray[Any], str, str]] = []
     label = ""

@@ -16,6 +16,7 @@ from ..base.durations import short_time
 from ..base.files import WEB_PAGE, check_output, write_text
 from ..base.library import version
 from ..base.names import counted
+from ..results.derived import column_of
 from ..results.settings import has_friction, solver_setting
 from ..results.standing import held, rows_of, seems_dead, silence, time_of_row, way_on
 from ..results.steady import steady_mean, steady_rows
@@ -160,8 +161,10 @@ def _tiles(run: Run) -> str:
     if not history.rows:
         return '<p class="note">The history has no rows yet.</p>'
     names = [("time", "Time")] if np.any(history["time"]) else []
-    names += [("pressure", "Mean pressure"), ("displacement", "Approach"),
-              ("contact_area", "Contact area"), ("mean_gap", "Mean gap")]
+    names.append(("force", "Normal force") if run.grid.boundary == "free"
+                 else ("pressure", "Mean pressure"))
+    names += [("displacement", "Approach"), ("contact_area", "Contact area"),
+              ("mean_gap", "Mean gap")]
     moving = "friction" in history and np.any(history["friction"])
     if moving:
         names.append(("friction", "Friction"))
@@ -172,7 +175,7 @@ def _tiles(run: Run) -> str:
     elif steady_rows(run)[-1]:
         names.append(("sliding_speed", "Sliding speed"))
     tiles = "\n".join(f"<div><dt>{label}</dt><dd>{_last(run, name)}</dd></div>"
-                      for name, label in names if name in history)
+                      for name, label in names if name in history or name == "force")
     step = f", step {history['step'][-1]}" if "step" in history else ""
     return (f'<p class="soft">The last row{step}:</p>\n<dl class="tiles">\n{tiles}\n</dl>'
             + (_mean_friction(run) if moving and history.rows > 1 else ""))
@@ -183,13 +186,12 @@ def _last(run: Run, name: str) -> str:
 
     Round-off is zero. That of the gap in full contact is small beside the approach.
     """
-    last = float(run.history[name][-1])
-    size = max(float(np.abs(run.history[column]).max())
-               for column in (name, "displacement" if name == "mean_gap" else name)
-               if column in run.history)
-    if abs(last) < 1e-9 * size:
-        last = 0.0
-    return number_html(last, run.history.units(name))
+    values, units = column_of(run, name)
+    size = float(np.abs(values).max())
+    if name == "mean_gap" and "displacement" in run.history:
+        size = max(size, float(np.abs(run.history["displacement"]).max()))
+    last = float(values[-1])
+    return number_html(last if abs(last) >= 1e-9 * size else 0.0, units)
 
 
 def _mean_friction(run: Run) -> str:
