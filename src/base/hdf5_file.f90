@@ -7,24 +7,37 @@
 !>
 !> A column grows row by row (`create_column`, `append`). The space for all its rows is set aside with the
 !> first row. A new row changes the values, which are written to the file at once, and the length of
-!> the column, a single small block that the next `flush` writes.
+!> the column, a single small block that the next `flush` writes. Columns stay open between rows, because
+!> opening them takes longer than writing a value.
 module hdf5_file
    use, intrinsic :: iso_c_binding, only : c_loc, c_null_ptr, c_ptr
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int8
+   use hdf5_c_values, only : h5dclose
    use hdf5_kinds, only : hid_t
    use hdf5_reader, only : hdf5_reader_type
    use hdf5_scales, only : attach_scales
    use hdf5_tree, only : most_expected
-   use hdf5_values, only : kind_int8, kind_integer, kind_real, new_column, new_dataset, put_rows
+   use hdf5_values, only : kind_int8, kind_integer, kind_real, new_column, new_dataset, open_column, &
+      put_rows
    implicit none
    private
 
    public :: hdf5_file_type, most_expected
 
+   !> A column that is open for writing.
+   type :: open_column_type
+      character(:), allocatable :: path
+      integer(hid_t) :: dataset = -1
+   end type open_column_type
+
    !> An open file.
    type, extends(hdf5_reader_type) :: hdf5_file_type
+      type(open_column_type), allocatable, private :: columns(:)
+      integer(hid_t), private :: columns_of = -1      !! the open file to which they belong: `id` changes with each opening
+      integer, private :: latest = 0                  !! number of the column that was written last
    contains
+      procedure :: stage_group
       procedure :: create_column
       procedure :: append
       procedure :: name_axes
@@ -209,15 +222,64 @@ contains
       real(dp), intent(in), contiguous :: values(:)  !! at least one
       type(error_type), allocatable, intent(out), optional :: error
       type(error_type), allocatable :: fault
-      character(:), allocatable :: name
-      integer(hid_t) :: location
       integer :: status
 
       if (self%has_failed(error)) return
-      call self%resolve(path, location, name)
-      call put_rows(location, name, row, values, status)
+      call find_column(self, path, status)
+      if (status >= 0) call put_rows(self%columns(self%latest)%dataset, row, values, status)
       call self%checked(status, 'the row cannot be written', path, fault)
       call self%settle(fault, error)
    end subroutine append
+
+   !> Make a column the latest one, and open it if it is not open yet. Rows are written column by column, so that
+   !> the search begins behind the latest one.
+   subroutine find_column(self, path, status)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      integer, intent(out) :: status
+      type(open_column_type) :: found
+      character(:), allocatable :: name
+      integer(hid_t) :: location
+      integer :: i, k
+
+      status = 0
+      if (self%columns_of /= self%id) then            ! closing a file closes its columns
+         self%columns = [open_column_type ::]
+         self%columns_of = self%id
+         self%latest = 0
+      end if
+
+      do k = 1, size(self%columns)
+         i = mod(self%latest + k - 1, size(self%columns)) + 1
+         if (self%columns(i)%path /= path) cycle
+         self%latest = i
+         return
+      end do
+
+      call self%resolve(path, location, name)
+      found%path = path
+      call open_column(location, name, found%dataset, status)
+      if (status < 0) return
+      self%columns = [self%columns, found]
+      self%latest = size(self%columns)
+   end subroutine find_column
+
+   !> Start a group that readers do not see before `publish_group` (module `hdf5_tree`). It may replace a group whose
+   !> columns are open.
+   subroutine stage_group(self, path, error)
+      class(hdf5_file_type), intent(inout) :: self
+      character(*), intent(in) :: path
+      type(error_type), allocatable, intent(out), optional :: error
+      integer :: i, ignored
+
+      if (self%has_failed(error)) return
+      if (self%columns_of == self%id) then
+         do i = 1, size(self%columns)
+            ignored = h5dclose(self%columns(i)%dataset)
+         end do
+      end if
+      self%columns_of = -1
+      call self%hdf5_reader_type%stage_group(path, error)
+   end subroutine stage_group
 
 end module hdf5_file

@@ -21,8 +21,8 @@ module hdf5_values
    implicit none
    private
 
-   public :: get_number, get_reals, get_text, new_column, new_dataset, put_attribute, put_rows, &
-      shape_of_dataset
+   public :: get_number, get_reals, get_text, new_column, new_dataset, open_column, put_attribute, &
+      put_rows, shape_of_dataset
 
    integer, parameter, public :: kind_text = 0
    integer, parameter, public :: kind_real = 1
@@ -263,27 +263,38 @@ contains
       ignored = h5pclose(creation)
    end subroutine new_column
 
-   !> Write values into a column from a given row on. The column grows to hold them.
-   subroutine put_rows(location, name, row, values, status)
+   !> Open a column for writing. It has no cache of its own, so that the values go straight to the file.
+   subroutine open_column(location, name, dataset, status)
       integer(hid_t), intent(in) :: location
       character(*), intent(in) :: name
+      integer(hid_t), intent(out) :: dataset
+      integer, intent(out) :: status
+      integer(hid_t) :: access_list
+      integer :: ignored
+
+      access_list = h5pcreate(h5p_dataset_access)
+      status = h5pset_chunk_cache(access_list, 0_size_t, 0_size_t, 0.75_c_double)
+      dataset = -1
+      if (status >= 0) then
+         dataset = h5dopen2(location, c_text(name), access_list)
+         status = status_of(dataset)
+      end if
+      if (status >= 0) ignored = h5pclose(access_list)
+   end subroutine open_column
+
+   !> Write values into an open column from a given row on. The column grows to hold them.
+   subroutine put_rows(dataset, row, values, status)
+      integer(hid_t), intent(in) :: dataset
       integer, intent(in) :: row            !! from 0; the column has at least this many rows
       real(dp), intent(in), contiguous, target :: values(:)  !! at least one
       integer, intent(out) :: status
-      integer(hid_t) :: access_list, dataset, memory, file_space
+      integer(hid_t) :: memory, file_space
       integer(hsize_t) :: count(1), first(1)
       integer :: ignored
 
       count = size(values)
       first = row
-      ! The dataset has no cache of its own, so that the values go straight to the file.
-      access_list = h5pcreate(h5p_dataset_access)
-      status = h5pset_chunk_cache(access_list, 0_size_t, 0_size_t, 0.75_c_double)
-      if (status >= 0) then
-         dataset = h5dopen2(location, c_text(name), access_list)
-         status = status_of(dataset)
-      end if
-      if (status >= 0) status = h5dset_extent(dataset, first + count)
+      status = h5dset_extent(dataset, first + count)
       if (status >= 0) then
          file_space = h5dget_space(dataset)
          memory = simple_space(count)
@@ -292,9 +303,7 @@ contains
       end if
       if (status >= 0) status = h5dwrite(dataset, h5t_native_double, memory, file_space, &
          h5p_default, c_loc(values))
-      if (status >= 0) status = h5dclose(dataset)
       if (status < 0) return
-      ignored = h5pclose(access_list)
       ignored = h5sclose(memory)
       ignored = h5sclose(file_space)
    end subroutine put_rows

@@ -22,7 +22,7 @@ module case_time
    public :: duration_text, seconds_needed
 
    integer, parameter :: probe = 128                        !! cells along a side of the measured transform
-   real(dp), parameter :: seconds_of_a_row = 5.0e-3_dp      !! to move the road, append a row to the file and flush it
+   real(dp), parameter :: seconds_of_a_row = 2.0e-3_dp      !! to move the road, append a row to the file and flush it
    real(dp), parameter :: seconds_to_begin = 0.08_dp
    real(dp), parameter :: seconds_of_a_cell = 0.6e-6_dp     !! to make the road and to write a snapshot
 
