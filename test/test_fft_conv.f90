@@ -1,6 +1,6 @@
 !> Tests of the influence coefficients and of the convolution operator.
 module test_fft_conv
-   use check, only : begin_suite, check_close, check_no_error, check_order, check_that, selected
+   use check, only : begin_suite, check_close, check_error, check_no_error, check_order, check_that, selected
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type, new_convolution, new_symbol_operator
    use influence, only : love_normal, love_tangential, transform_length
@@ -18,6 +18,7 @@ contains
 
    subroutine run_fft_conv()
       call begin_suite('fft_conv')
+      if (selected('poisson_ratios_are_checked')) call poisson_ratios_are_checked()
       if (selected('good_lengths')) call good_lengths()
       if (selected('coefficients_match_quadrature')) call coefficients_match_quadrature()
       if (selected('oblique_waves_are_eigenfunctions')) then
@@ -45,6 +46,15 @@ contains
       if (selected('large_periodic_cell_is_like_free')) call large_periodic_cell_is_like_free()
       if (selected('transform_lengths_of_grids')) call transform_lengths_of_grids()
    end subroutine run_fft_conv
+
+   !> A solid cannot have a Poisson ratio above 0.5.
+   subroutine poisson_ratios_are_checked()
+      type(convolution_type) :: operator
+      type(error_type), allocatable :: error
+
+      call new_convolution(operator, new_grid(4, 4, 1.0_dp, 1.0_dp, boundary_periodic), normal_half_space(0.7_dp), error)
+      call check_error(error, 'poisson = 0.7: must be > -1 and <= 0.5', 'a ratio of 0.7')
+   end subroutine poisson_ratios_are_checked
 
    !> A periodic grid is not padded. A free grid is padded to a length with small factors.
    subroutine transform_lengths_of_grids()

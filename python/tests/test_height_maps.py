@@ -149,6 +149,8 @@ def test_threads():
         asperity.set_threads(-1)
     with pytest.raises(ValueError, match="number = 'a': must be an integer from 0"):
         asperity.set_threads("a")
+    with pytest.raises(ValueError, match="number = 200000: must be an integer from 0 to 1024"):
+        asperity.set_threads(200000)  # more than a process can start
 
 
 def test_curvature_of_a_profile_is_its_second_derivative():

@@ -121,6 +121,10 @@ def test_options_are_checked():
     for wrong in (-1.0, np.nan, np.inf, None, "a"):
         with pytest.raises(ValueError, match=r"^thickness = .*: must be a finite number >= 0$"):
             asperity.operators.tangential(8, 4, 1.0, modulus=1.0, thickness=wrong)
+    with pytest.raises(ValueError, match=r"^thickness = 2: must be 0 with boundary = 'free'$"):
+        asperity.operators.tangential(8, 4, 1.0, modulus=1.0, thickness=2.0, boundary="free")
+    with pytest.raises(ValueError, match="nx = 2147483648: must be an integer from 1 to 214748364"):
+        asperity.operators.normal(2**31, 4, 1.0, modulus=1.0)
     cases = [(asperity.operators.normal(8, 4, 1.0, modulus=1.0, boundary=boundary), (4, 8))
              for boundary in ("periodic", "free")]
     cases.append((asperity.operators.tangential(8, 4, 1.0, modulus=1.0), (2, 4, 8)))

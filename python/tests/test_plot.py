@@ -460,6 +460,8 @@ def test_data_of_one_sign_have_a_scale_of_one_sign(frictional):
         assert "viridis" in style["cmap"]
     _, _, style = field_style(np.array([[-1.0, 2.0]]), "traction_x", "Pa")
     assert (style["norm"].vmin, style["norm"].vmax) == (-2.0, 2.0) and style["cmap"] == "RdBu_r"
+    _, _, style = field_style(np.array([[-3.0, 0.0]]), "pressure", "Pa")
+    assert style["cmap"].name == "Blues_r", "a tension is blue without pressures beside it, too"
     assert snapshot.plot("pressure").images
 
 

@@ -186,6 +186,10 @@ def test_files_and_arguments(case, tmp_path):
         asperity.run(case, output=tmp_path / "lost" / "x.h5")
     with pytest.raises(ValueError, match="threads = 0"):
         asperity.run(case, threads=0)
+    with pytest.raises(ValueError, match="threads = 1000000: must be an integer from 1 to 1024"):
+        asperity.run(case, threads=1000000)
+    with pytest.raises(ValueError, match="threads = 1000000: must be an integer from 1 to 1024"):
+        asperity.Simulation(case, threads=1000000)
     with pytest.raises(ValueError, match="output: has 0 characters"):
         asperity.run(case, output="")
 

@@ -201,7 +201,7 @@ contains
          row('friction', 'coefficient', kind_real, '(required)', '', 'not negative', &
             'Coulomb friction coefficient of the interface; at most 1000 with a steady phase.'), &
          row('friction', 'shear_strength', kind_real, '(required)', 'Pa', 'positive', &
-            'Shear strength of the interface.'), &
+            'Shear strength of the interface, a force per area of the mean plane of the road, also on slopes.'), &
          row('friction', 'table_pressure', kind_reals, '(required)', 'Pa', 'not negative', &
             'Pressures of the points of a table, which begin at 0 and rise; straight lines join the points.'), &
          row('friction', 'table_strength', kind_reals, '(required)', 'Pa', 'not negative', &

@@ -27,6 +27,7 @@ module fft_conv
    use row_column_single, only : new_row_column_single => new_row_column, &
       row_column_single_type => row_column_type
    use row_sharing, only : row_sharing_type
+   use text_tools, only : to_text
    use symbol_table, only : new_symbol_table, symbol_table_type
    use transform_shape, only : shape_on_grid, transform_shape_type
    implicit none
@@ -90,6 +91,7 @@ contains
 
       if (.not. allocated(error) .and. grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) &
          call fail(error, error_input, 'this solid is for periodic boundaries only')
+      call check_poisson(kernel, error)
       call plan(self, shape_on_grid(grid, kernel%components, sharing), error, single, memory)
       if (allocated(error)) return
       self%grid = grid
@@ -105,6 +107,15 @@ contains
       call self%symbols%finish()
    end subroutine new_convolution
 
+   !> Refuse a Poisson ratio that no elastic solid has.
+   subroutine check_poisson(kernel, error)
+      type(kernel_type), intent(in) :: kernel
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+
+      if (allocated(error) .or. (kernel%poisson > -1.0_dp .and. kernel%poisson <= 0.5_dp)) return
+      call fail(error, error_input, 'poisson = '//to_text(kernel%poisson)//': must be > -1 and <= 0.5')
+   end subroutine check_poisson
+
    !> The inverse of the operator of a solid on a periodic grid: tractions from displacements, Pa/m.
    subroutine new_inverse_convolution(self, grid, kernel, error)
       type(convolution_type), intent(out) :: self
@@ -112,6 +123,7 @@ contains
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
 
+      call check_poisson(kernel, error)
       call plan(self, shape_on_grid(grid, kernel%components), error)
       if (allocated(error)) return
       self%grid = grid

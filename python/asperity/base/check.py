@@ -114,8 +114,8 @@ def positives(**values: float) -> tuple[float, ...]:
     return tuple(positive(name, value) for name, value in values.items())
 
 
-def whole(name: str, value: float, low: int = 1) -> int:
-    """Return `value` as an int from `low` to 2^31 - 1, the largest number of the library.
+def whole(name: str, value: float, low: int = 1, high: int = 2**31 - 1) -> int:
+    """Return `value` as an int from `low` to `high`, by default the largest of the library.
 
     Raises
     ------
@@ -134,10 +134,23 @@ def whole(name: str, value: float, low: int = 1) -> int:
     if isinstance(value, np.generic):
         value = value.item()
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or not low <= value < 2**31 or int(value) != value:
-        allowed = "a positive integer" if low == 1 else f"an integer from {low} to {2**31 - 1}"
+    if not good or not low <= value <= high or int(value) != value:
+        large = good and value > high
+        allowed = ("a positive integer" if low == 1 and high == 2**31 - 1 and not large
+                   else f"an integer from {low} to {high}")
         raise ValueError(f"{name} = {shown(value)}: must be {allowed}")
     return int(value)
+
+
+def number_of_threads(name: str, value: float, low: int = 1) -> int:
+    """Return `value` as a number of threads, of which the library allows up to 1024.
+
+    Raises
+    ------
+    ValueError
+        If it is not such a number.
+    """
+    return whole(name, value, low, 1024)
 
 
 def poisson_ratio(value: float) -> float:

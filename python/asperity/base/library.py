@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity import _core
 
-from .check import choice, no_masked, positive, whole
+from .check import choice, no_masked, number_of_threads, positive
 from .errors import raise_for_status
 
 __all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "height_map",
@@ -110,8 +110,8 @@ def set_threads(number: int = 0) -> int:
     Parameters
     ----------
     number : int
-        Number of threads. 0 means the value of the environment variable OMP_NUM_THREADS or
-        SLURM_CPUS_PER_TASK, or all processors if neither is set.
+        Number of threads, up to 1024. 0 means the value of the environment variable
+        OMP_NUM_THREADS or SLURM_CPUS_PER_TASK, or all processors if neither is set.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def set_threads(number: int = 0) -> int:
     Raises
     ------
     ValueError
-        If the number is negative.
+        If the number is negative or larger than 1024.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def set_threads(number: int = 0) -> int:
     >>> asperity.set_threads(1)
     1
     """
-    number = whole("number", number, 0)
+    number = number_of_threads("number", number, 0)
     with _lock:
         return int(_core.flat_library.set_thread_count(number))
 
@@ -152,7 +152,7 @@ def height_map(height: ArrayLike, name: str = "height") -> NDArray[np.float64]:
     if array.ndim == 1 and np.ndim(height) == 1:
         array = array[None, :]
     if array.ndim != 2 or np.ndim(height) == 0 or array.size == 0:
-        raise ValueError(f"{name}: has shape {np.shape(height)}: must be (ny, nx)")
+        raise ValueError(f"{name}: has shape {np.shape(height)}: must be (ny, nx), both at least 1")
     if not np.isfinite(array).all():
         j, i = np.argwhere(~np.isfinite(array))[0]
         raise ValueError(f"{name}[{j}, {i}] = {array[j, i]}: must be finite")

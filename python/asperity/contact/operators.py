@@ -326,7 +326,8 @@ def tangential(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus:
         Poisson ratio.
     thickness : float
         Thickness of the block, m. In a periodic cell the mean traction T then causes the mean
-        displacement thickness T/G. With 0 the mean displacement is zero.
+        displacement thickness T/G. With 0 the mean displacement is zero. A free half-space has no
+        thickness.
     boundary : str
         'periodic' or 'free'.
 
@@ -341,5 +342,8 @@ def tangential(nx: int, ny: int, lx: float, ly: float | None = None, *, modulus:
     MemoryError
         If there is not enough memory.
     """
+    thickness = number("thickness", thickness, 0.0)
+    if thickness > 0.0 and boundary == "free":
+        raise ValueError(f"thickness = {thickness:g}: must be 0 with boundary = 'free'")
     return TangentialOperator(nx, ny, lx, ly, modulus, boundary, poisson_ratio(poisson),
-                              number("thickness", thickness, 0.0))
+                              thickness)

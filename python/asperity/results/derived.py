@@ -45,7 +45,7 @@ def column_of(run: ResultFile, name: str) -> tuple[NDArray[Any], str]:
     if name == "force":
         return normal_force(run), "N"
     if name not in run.history:
-        names = [*run.history, "energy", "force"]
+        names = list(dict.fromkeys([*run.history, "energy", "force"]))
         raise UnknownNameError(unknown_name("column of the history", name, names))
     return run.history[name], run.history.units(name)
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base import library
-from ..base.check import shown, whole
+from ..base.check import number_of_threads, shown
 from ..base.errors import NotConverged
 from ..base.files import check_folder
 from ..results import Run
@@ -194,7 +194,7 @@ def _checked(case: Any, output: str | os.PathLike[str] | None, threads: int | No
         raise ValueError("restart=True and overwrite=True are given together: give one of them")
     if output is not None and not 0 < (length := len(os.fsencode(output))) <= 1024:
         raise ValueError(f"output: has {length} characters: must have 1 to 1024")
-    return 0 if threads is None else whole("threads", threads)
+    return 0 if threads is None else number_of_threads("threads", threads)
 
 
 def _with_arguments(message: str) -> str:

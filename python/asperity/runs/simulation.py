@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import library
-from ..base.check import number, whole
+from ..base.check import number, number_of_threads
 from ..base.errors import NotConverged
 from ..base.files import STATE, check_output, new_file
 from ..base.names import NamedFields, UnknownNameError, unknown_name
@@ -171,7 +171,7 @@ class Simulation:
     def __init__(self, case: str | os.PathLike[str] | _CaseLike, *,
                  threads: int | None = None) -> None:
         if threads is not None:
-            threads = whole("threads", threads)
+            threads = number_of_threads("threads", threads)
         path, text = namelists.source(case)
         handle, rows, nx, ny, lx, ly, notes = _open(os.fsencode(path), namelists.encode(text),
                                                     threads or 0)

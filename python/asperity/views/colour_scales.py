@@ -117,6 +117,7 @@ def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str,
             high = 1.0
         cmap = "viridis" if high > 0.0 else "viridis_r"
         if name == "pressure":
+            cmap = "Blues_r" if high <= 0.0 else cmap  # the tensions of a field of both signs
             cmap = plt.get_cmap(cmap).with_extremes(bad=NO_CONTACT)
     else:
         low, high = float(field.min()) * factor, float(field.max()) * factor
