@@ -126,8 +126,15 @@ def test_lock_shows_whether_a_run_continues(program: str, stuck: Path,
     with monkeypatch.context() as patch:
         patch.setattr("asperity.results.standing.silence", lambda run: 1e6)
         assert "no longer running" not in asperity.open(result).state
+
+    def told() -> str:
+        return subprocess.run([program, "info", str(result)], stdout=subprocess.PIPE, text=True,
+                              check=True).stdout
+
+    assert "outcome     the run continues\n" in told()
     process.kill()
     process.communicate(timeout=PATIENCE)
+    assert "the process has ended: it was killed, or could not write" in told()
     assert asperity.open(result).state.endswith("its process has ended")
     lines = io.StringIO()
     watch(result, once=True, stream=lines)

@@ -10,13 +10,18 @@ module file_lock
    use, intrinsic :: iso_c_binding, only : c_int
    use asperity_errors, only : error_file, error_type, fail
    use file_kind, only : file_start, is_other_than_file, same_inode
+   use asperity_precision, only : int64
    use file_system, only : remove_file
    use text_tools, only : to_text
    use utc_clock, only : utc_time
    implicit none
    private
 
-   public :: file_lock_type
+   public :: file_lock_type, lock_free, lock_held, lock_unknown, state_of_lock
+
+   integer, parameter :: lock_unknown = 0                  !! there is no lock, or it is on another machine or system
+   integer, parameter :: lock_held = 1                     !! a process holds it
+   integer, parameter :: lock_free = 2                     !! the process that took it has ended without releasing it
 
    integer(c_int), parameter :: exclusive_at_once = 6      !! LOCK_EX + LOCK_NB of every Unix
    integer(c_int), parameter :: unlock = 8                 !! LOCK_UN
@@ -110,6 +115,48 @@ contains
       call hostnm(host)
       call write_line(self%unit, mark//to_text(int(c_getpid()))//' on '//trim(host)//' since '//utc_time())
    end subroutine acquire
+
+   !> The state of a lock. An attempt to take it could prevent a run from starting at that moment. Linux's list of all
+   !> locks is read instead.
+   function state_of_lock(path) result(state)
+      character(*), intent(in) :: path                !! of the lock's own file
+      integer :: state
+      character(200) :: host, line
+      character(:), allocatable :: holder
+      integer :: properties(13), status, unit
+
+      state = lock_unknown
+      holder = file_start(path, 200)
+      call hostnm(host)
+      if (index(holder, mark) /= 1 .or. index(holder, ' on '//trim(host)//' since ') == 0) return
+      call stat(path, properties, status)
+      if (status /= 0) return
+
+      open (newunit=unit, file='/proc/locks', status='old', action='read', iostat=status)
+      if (status /= 0) return
+      state = lock_free
+      do
+         read (unit, '(a)', iostat=status) line
+         if (status /= 0) exit
+         if (index(line, ' FLOCK ') > 0 .and. is_file_of(line, properties(2))) state = lock_held
+      end do
+      close (unit)
+   end function state_of_lock
+
+   !> Does a line of /proc/locks, which contains `major:minor:inode`, name a file of this inode? `stat` returns only the
+   !> last 32 bits of it.
+   pure function is_file_of(line, inode) result(yes)
+      character(*), intent(in) :: line
+      integer, intent(in) :: inode
+      logical :: yes
+      integer(int64), parameter :: last_bits = 2_int64**32 - 1
+      integer(int64) :: found
+      integer :: status
+
+      read (line(index(line, ':', back=.true.) + 1:), *, iostat=status) found
+      yes = status == 0
+      if (yes) yes = iand(found, last_bits) == iand(int(inode, int64), last_bits)
+   end function is_file_of
 
    !> The line of a process in the file of a lock; empty if there is none.
    function first_line(unit) result(text)

@@ -6,9 +6,12 @@ module result_summary
    use case_input, only : parse_case
    use case_settings, only : case_type
    use asperity_errors, only : error_file, error_memory, error_type, fail
+   use file_lock, only : lock_free, lock_held, state_of_lock
    use hdf5_file, only : hdf5_file_type
    use asperity_precision, only : dp
+   use path_identity, only : real_path
    use result_check, only : damage_type, find_damage
+   use result_names, only : sibling_path
    use text_tools, only : in_one_line, in_quotes, next_line, to_text
    use trial_process, only : trial_type
    implicit none
@@ -188,15 +191,31 @@ contains
       end if
       if (finished == 0 .and. file%has_attribute('/', 'outcome')) then
          call file%read_attribute('/', 'outcome', outcome)
-         ! A run that a full disk has ended cannot write to its result, just as one that was killed.
-         if (outcome == 'running') outcome = 'not recorded: the run continues, or was killed, or could not write '// &
-            'its result, as on a full disk'//row_note(file)
+         if (outcome == 'running') outcome = unrecorded_outcome(file, path)
          text = text//'outcome     '//in_one_line(outcome, 400)//nl
       end if
       call add_warnings(file, 'warnings', text)
       call add_warnings(file, 'run_warnings', text)
       call file%report(error)
    end subroutine describe
+
+   !> What is known of a run that has not recorded its end. A run that a full disk has ended cannot write to its result,
+   !> just as one that was killed.
+   function unrecorded_outcome(file, path) result(text)
+      type(hdf5_file_type), intent(inout) :: file
+      character(*), intent(in) :: path
+      character(:), allocatable :: text
+
+      select case (state_of_lock(sibling_path(real_path(path), '.lock')))
+      case (lock_held)
+         text = 'the run continues'
+      case (lock_free)
+         text = 'not recorded: the process has ended: it was killed, or could not write its result, as on a full disk'
+      case default
+         text = 'not recorded: the run continues, or was killed, or could not write its result, as on a full disk'// &
+            row_note(file)
+      end select
+   end function unrecorded_outcome
 
    !> The time that the last row took, so that the reader can judge whether the run is still alive; '' if it is not
    !> known.
