@@ -328,12 +328,14 @@ contains
       character(:), allocatable :: name
       integer(hid_t) :: location
 
-      object = -1
       call self%resolve(path, location, name)
+      object = h5oopen(location, c_text(name), h5p_default)
+      if (object >= 0) return
       if (.not. self%has(path)) then
          call fail(fault, error_file, self%path//': there is no '//trim(path))
          return
       end if
+      ! Try again, because HDF5 forgets the reason of a failure with its next call.
       object = h5oopen(location, c_text(name), h5p_default)
       call self%checked(status_of(object), 'cannot be opened', path, fault)
    end subroutine open_object
