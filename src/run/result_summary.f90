@@ -326,12 +326,7 @@ contains
       text = text//nl//'last row'//nl
       do i = 1, size(names)
          if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is no friction
-         ! In free mode the size of the grid is arbitrary, and so is the mean pressure.
-         if (names(i) == 'pressure' .and. area > 0.0_dp) then
-            text = text//'  force'//repeat(' ', len(names) - len('force'))//to_text(last(i)*area)//' N'//nl
-         else
-            text = text//'  '//names(i)//to_text(last(i))//trim(units(i))//nl
-         end if
+         text = text//'  '//named_value(names(i), last(i), units(i), area)//nl
       end do
 
       do i = 1, size(names)
@@ -341,6 +336,22 @@ contains
       end do
       call add_missing_work(file, text)
    end subroutine history_text
+
+   !> Name and value of a column. In free mode the size of the grid is arbitrary, and so is the mean pressure: the force is
+   !> given instead.
+   function named_value(name, value, units, area) result(text)
+      character(20), intent(in) :: name
+      real(dp), intent(in) :: value
+      character(*), intent(in) :: units
+      real(dp), intent(in) :: area                   !! of the grid in free mode, m2; 0 in periodic mode
+      character(:), allocatable :: text
+      character(20) :: other
+
+      text = name//to_text(value)//trim(units)
+      if (name /= 'pressure' .or. .not. area > 0.0_dp) return
+      other = 'force'
+      text = other//to_text(value*area)//' N'
+   end function named_value
 
    !> Add the line with the error of the steps in the energy balance.
    subroutine add_missing_work(file, text)
