@@ -384,7 +384,7 @@ def test_unit_and_size_that_a_file_lacks(tmp_path):
         load(path)
     with pytest.raises(ValueError, match=r"map\.npy: gives no lengths: give them.*--size"):
         load(path, unit="nm")
-    with pytest.raises(ValueError, match="size: has 1 lengths, must have 2"):
+    with pytest.raises(ValueError, match="size: has 1 length, must have 2"):
         load(path, unit="nm", size=3.0)
     with pytest.raises(ValueError, match="unit = 'furlong': must be one of"):
         load(path, unit="furlong", size=(1, 1))
