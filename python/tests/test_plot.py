@@ -6,7 +6,6 @@ import resource
 import subprocess
 import sys
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from itertools import pairwise
 
 import h5py
 import matplotlib.pyplot as plt
@@ -485,20 +484,17 @@ def test_labels_of_very_oblong_maps_do_not_overlap(tmp_path, nx, ny, name):
                        for other in boxes[number + 1:])
 
 
-def test_narrow_maps_of_the_overview_have_whole_labels(tmp_path):
-    """Both bars stand beside their map, and the labels below it do not overlap."""
+def test_narrow_maps_of_the_overview_have_upright_labels_and_bars(tmp_path):
+    """Labels in a row would overlap below a narrow map, and a bar below it would be far away."""
     path = tmp_path / "narrow.h5"
-    write_result(path, nx=16, ny=96, lx=1e-3, ly=6e-3)
+    write_result(path, nx=16, ny=128, lx=1e-3, ly=8e-3)
     figure = asperity.open(path).overview()
     figure.canvas.draw()
     for panel in figure.axes[:2]:
+        assert all(label.get_rotation() == 90.0 for label in panel.get_xticklabels())
         (bar,) = (axes for axes in figure.axes if axes.get_ylabel().startswith(
             panel.get_title().lower()))
         assert bar.get_window_extent().height > 4.0 * bar.get_window_extent().width
-        boxes = [tick.label1.get_window_extent() for tick in panel.xaxis.get_major_ticks()
-                 if panel.get_xlim()[0] <= tick.get_loc() <= panel.get_xlim()[1]]
-        assert len(boxes) >= 2
-        assert not any(one.overlaps(other) for one, other in pairwise(boxes))
 
 
 def test_arrows_on_a_stretched_map_have_the_directions_of_the_tractions(tmp_path):

@@ -17,7 +17,7 @@ module file_lock
    implicit none
    private
 
-   public :: file_lock_type, lock_free, lock_held, lock_unknown, state_of_lock
+   public :: file_lock_type, lock_free, lock_held, state_of_lock
 
    integer, parameter :: lock_unknown = 0                  !! there is no lock, or it is on another machine or system
    integer, parameter :: lock_held = 1                     !! a process holds it
@@ -91,8 +91,11 @@ contains
          if (c_flock(int(fnum(self%unit), c_int), exclusive_at_once) /= 0) then
             if (any(ierrno() == would_block)) then
                holder = first_line(self%unit)
-               if (holder == '') holder = 'asperity another process'
-               holder = holder(len('asperity ') + 1:)
+               if (holder == '') then
+                  holder = 'another process'
+               else
+                  holder = holder(len('asperity ') + 1:)
+               end if
                close (self%unit)
                self%unit = 0
                call fail(error, error_file, protected//': is in use by '//holder// &
@@ -144,7 +147,8 @@ contains
    end function state_of_lock
 
    !> Does a line of /proc/locks, which contains `major:minor:inode`, name a file of this inode? `stat` returns only the
-   !> last 32 bits of it.
+   !> last 32 bits of it. Another file that has the same bits and is locked would be taken for this one, which is rare
+   !> and only makes a message wrong.
    pure function is_file_of(line, inode) result(yes)
       character(*), intent(in) :: line
       integer, intent(in) :: inode

@@ -264,8 +264,8 @@ contains
       self%latest = size(self%columns)
    end subroutine find_column
 
-   !> Start a group that readers do not see before `publish_group` (module `hdf5_tree`). It may replace a group whose
-   !> columns are open.
+   !> Start a group that readers do not see before `publish_group` (module `hdf5_tree`). If it replaces the group of the
+   !> open columns, they are closed.
    subroutine stage_group(self, path, error)
       class(hdf5_file_type), intent(inout) :: self
       character(*), intent(in) :: path
@@ -275,10 +275,11 @@ contains
       if (self%has_failed(error)) return
       if (self%columns_of == self%id) then
          do i = 1, size(self%columns)
+            if (index(self%columns(i)%path, trim(path)//'/') /= 1) cycle
             ignored = h5dclose(self%columns(i)%dataset)
+            self%columns_of = -1
          end do
       end if
-      self%columns_of = -1
       call self%hdf5_reader_type%stage_group(path, error)
    end subroutine stage_group
 

@@ -62,8 +62,8 @@ contains
             if (phase%static) step = merge(adhesive_step, solve, adheres)
             transforms = transforms + phase%steps*step
             jumps = jumps - phase%steps
-            ! The first row of a steady phase is one of its steps, or a row of its own.
-            if (phase%steady) transforms = transforms + steady - step
+            ! The first row of a steady phase is its only one, or comes before its steps, as a jump.
+            if (phase%steady) transforms = transforms + steady - merge(step, solve, phase%static)
          end associate
       end do
       transforms = transforms + jumps*solve

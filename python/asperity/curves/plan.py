@@ -27,12 +27,12 @@ FloatArray = NDArray[np.float64]
 # without friction, for an elastic rubber and 128 cells per side; the exponent of the ratio of the
 # glassy to the relaxed modulus that multiplies it; and that of the number of cells per side over
 # 128. Measured on self-affine roads with 64 to 512 cells per side and rubbers of 1 to 12 arms with
-# ratios of 1.1 to 1000. The law on the true slope takes more of them.
+# ratios of 1.1 to 1000. With the friction law on the true slope there are more by a factor.
 _TRANSFORMS = {True: (220.0, 0.08, 0.25), False: (50.0, 0.1, 0.4)}
+_ON_SLOPES = 1.5
 # Processor time per transform, with all other work on the cells, over that of a real transform by
 # NumPy; and the time to begin a run and to gather it, s; and to begin the command, s.
 _OTHER_WORK = 8.0
-_ON_SLOPES = 1.5
 _RUN, _COMMAND = 0.02, 2.5
 _RANGE = 1e-30, 1e30    # allowed speeds, m/s, and pressures, Pa
 _LARGEST_COEFFICIENT = 1000.0  # that of steady phases

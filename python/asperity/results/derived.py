@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from .history import Grid
     from .result_file import ResultFile
 
-__all__ = ["closure", "column_of", "energy_terms", "headline_columns", "missing_work",
-           "normal_force", "rms_slope", "road_speed", "travel"]
+__all__ = ["closure", "column_of", "energy_terms", "headline_columns", "load_name",
+           "missing_work", "normal_force", "rms_slope", "road_speed", "travel"]
 
 FloatArray = NDArray[np.float64]
 
@@ -32,6 +32,14 @@ def rms_slope(grid: Grid, height: FloatArray) -> float:
 def normal_force(run: ResultFile) -> FloatArray:
     """Return the normal force on the whole grid, N, one value per row."""
     return np.asarray(run.history["pressure"], dtype=float) * run.grid.lx * run.grid.ly
+
+
+def load_name(run: ResultFile) -> str:
+    """Return the name by which `column_of` gives the load: 'force' in free mode, or 'pressure'.
+
+    In free mode the area of the grid is arbitrary, and so is the mean pressure.
+    """
+    return "force" if run.grid.boundary == "free" else "pressure"
 
 
 def column_of(run: ResultFile, name: str) -> tuple[NDArray[Any], str]:
@@ -51,17 +59,11 @@ def column_of(run: ResultFile, name: str) -> tuple[NDArray[Any], str]:
 
 
 def headline_columns(run: ResultFile) -> list[tuple[str, FloatArray, str]]:
-    """Return name, values and units of the columns that describe a run in a few numbers.
-
-    In free mode the load is given as a force, because the area of the grid means nothing there.
-    """
-    history = run.history
-    named = [(name, history[name], history.units(name))
-             for name in ("time", "pressure", "contact_area", "friction") if name in history]
-    if run.grid.boundary != "free":
-        return named
-    return [("force", normal_force(run), "N") if column[0] == "pressure" else column
-            for column in named]
+    """Return name, values and units of the columns that describe a run in a few numbers."""
+    names = [name for name in ("time", "pressure", "contact_area", "friction")
+             if name in run.history]
+    return [(name, *column_of(run, name))
+            for name in (load_name(run) if name == "pressure" else name for name in names)]
 
 
 def travel(run: ResultFile) -> FloatArray | None:

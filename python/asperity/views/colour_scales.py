@@ -117,8 +117,9 @@ def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str,
             high = 1.0
         cmap = "viridis" if high > 0.0 else "viridis_r"
         if name == "pressure":
-            cmap = "Blues_r" if high <= 0.0 else cmap  # the tensions of a field of both signs
-            cmap = plt.get_cmap(cmap).with_extremes(bad=NO_CONTACT)
+            # Tensions are blue, as they are beside pressures.
+            cmap = plt.get_cmap("viridis" if high > 0.0 else "Blues_r").with_extremes(
+                bad=NO_CONTACT)
     else:
         low, high = float(field.min()) * factor, float(field.max()) * factor
         if low == high:  # for example the gap in full contact

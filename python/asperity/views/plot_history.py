@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from ..results.derived import closure, column_of, energy_terms, road_speed, travel
+from ..results.derived import closure, column_of, energy_terms, load_name, road_speed, travel
 from ..results.road_slopes import friction_outside
 from ..results.settings import has_adhesion, has_friction
 from ..results.steady import steady_mean, steady_rows, steady_speeds
@@ -80,8 +80,7 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
         along, label, log = horizontal(run)
     else:
         if x is None:
-            load = "force" if run.grid.boundary == "free" else "pressure"
-            x = next((column for column in ("time", load, "step")
+            x = next((column for column in ("time", load_name(run), "step")
                       if column != name and np.ptp(column_of(run, column)[0]) > 0.0),
                      "step") if history.rows else "step"
         values, units = column_of(run, x)

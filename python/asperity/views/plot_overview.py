@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..results.derived import normal_force, rms_slope
+from ..results.derived import column_of, load_name, normal_force, rms_slope
 from ..results.settings import (
     has_adhesion,
     has_friction,
@@ -174,25 +174,23 @@ def _load_panel(run: Run, axes: Axes) -> None:
     The load is the force in free mode, and the mean pressure in periodic mode.
     """
     history = run.history
-    name, pressure, units = "pressure", history["pressure"], "Pa"
-    if run.grid.boundary == "free":
-        name, pressure, units = "force", normal_force(run), "N"
-    factor, unit = si_scale(pressure, units)
+    load, units = column_of(run, load_name(run))
+    factor, unit = si_scale(load, units)
     if _persson_applies(run):
         modulus = 2.0 * float(run.material.shear_modulus) / (1.0 - float(run.material.poisson))
         slope = rms_slope(run.grid, run.height)
-        if slope > 0.0 and pressure.max(initial=0.0) > 0.0:
+        if slope > 0.0 and load.max(initial=0.0) > 0.0:
             from ..theory import persson_area  # SciPy takes long to load
 
-            loads = np.linspace(0.0, 1.05 * pressure.max(), 200)
+            loads = np.linspace(0.0, 1.05 * load.max(), 200)
             areas = persson_area(loads, modulus, slope)
             axes.plot(loads * factor, areas, color=COLOURS[1], linestyle="--",
                       label="Persson (2001)")
-    axes.plot(pressure * factor, history["contact_area"], color=COLOURS[0], marker="o",
+    axes.plot(load * factor, history["contact_area"], color=COLOURS[0], marker="o",
               linestyle="-" if history.rows > 1 else "", label="this run")
-    axes.set_xlabel(axis_text(LABELS[name], unit))
+    axes.set_xlabel(axis_text(LABELS[load_name(run)], unit))
     axes.set_ylabel(axis_text(LABELS["contact_area"], ""))
-    axes.set_xlim(left=min(0.0, 1.05 * pressure.min(initial=0.0) * factor))
+    axes.set_xlim(left=min(0.0, 1.05 * load.min(initial=0.0) * factor))
     axes.set_ylim(bottom=0.0)
     axes.set_title("Contact area against load",
                    pad=6.0 + 1.5 * plt.rcParams["legend.fontsize"])

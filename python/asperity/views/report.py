@@ -16,11 +16,12 @@ from ..base.durations import short_time
 from ..base.files import WEB_PAGE, check_output, write_text
 from ..base.library import version
 from ..base.names import counted
-from ..results.derived import column_of
+from ..results.derived import column_of, load_name
 from ..results.settings import has_friction, solver_setting
 from ..results.standing import held, rows_of, seems_dead, silence, time_of_row, way_on
 from ..results.steady import steady_mean, steady_rows
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
+from .report_charts import LOADS
 from .report_data import faulty, now, page_data
 from .report_sections import number_html, sections_of
 from .style import sentence, typeset
@@ -161,8 +162,7 @@ def _tiles(run: Run) -> str:
     if not history.rows:
         return '<p class="note">The history has no rows yet.</p>'
     names = [("time", "Time")] if np.any(history["time"]) else []
-    names.append(("force", "Normal force") if run.grid.boundary == "free"
-                 else ("pressure", "Mean pressure"))
+    names.append((load_name(run), LOADS[load_name(run)]))
     names += [("displacement", "Approach"), ("contact_area", "Contact area"),
               ("mean_gap", "Mean gap")]
     moving = "friction" in history and np.any(history["friction"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results.derived import closure, energy_terms, normal_force, road_speed
+from ..results.derived import closure, column_of, energy_terms, load_name, road_speed
 from ..results.road_slopes import friction_outside
 from ..results.settings import has_adhesion, has_friction, solver_setting
 from ..results.steady import steady_speeds
@@ -16,11 +16,12 @@ from .style import LABELS
 if TYPE_CHECKING:
     from ..results import Run
 
-__all__ = ["MOST_SNAPSHOTS", "charts_of"]
+__all__ = ["LOADS", "MOST_SNAPSHOTS", "charts_of"]
 
 FloatArray = NDArray[np.float64]
 
 MOST_SNAPSHOTS = 40
+LOADS = {"force": "Normal force", "pressure": "Mean pressure"}
 
 
 def charts_of(run: Run) -> tuple[dict[str, FloatArray], list[dict[str, Any]]]:
@@ -56,9 +57,9 @@ class _Charts:
         self.columns: dict[str, FloatArray] = {name: np.asarray(history[name]) for name in (
             "step", "phase", "time", "pressure", "displacement", "contact_area", "friction")
             if name in history}
-        if run.grid.boundary == "free":
-            del self.columns["pressure"]
-            self.columns["force"] = normal_force(run)
+        self.load = load_name(run)
+        self.columns.pop("pressure", None)
+        self.columns[self.load], self.units_of_load = column_of(run, self.load)
         self.speeds = steady_speeds(run)
         if self.speeds is not None:  # the road has no travel in steady states
             self.columns["speed"] = self.speeds
@@ -117,19 +118,12 @@ class _Charts:
                     *self.series("mean_gap", "mean gap", 1, "6 3")])
 
     def add_load(self) -> None:
-        """Add a load that varies: the force in free mode, where the area of the grid means nothing.
-
-        In periodic mode it is the mean pressure.
-        """
-        load = self.history["pressure"]
-        if not len(load) or np.ptp(load) <= 1e-6 * np.abs(load).max():
-            return
-        if self.run.grid.boundary == "free":
-            self.chart("time", "force", "Normal force", "Force", "N",
-                       self.series("force", "normal force", 0, values=self.columns["force"]))
-        else:
-            self.chart("time", "pressure", "Mean pressure", "Pressure", "Pa",
-                       self.series("pressure", "mean pressure", 0))
+        """Add a load that varies."""
+        name, load = self.load, self.columns[self.load]
+        if len(load) and np.ptp(load) > 1e-6 * np.abs(load).max():
+            words = LOADS[name]
+            self.chart("time", name, words, words.split()[-1].capitalize(), self.units_of_load,
+                       self.series(name, words[:1].lower() + words[1:], 0, values=load))
 
     def add_energy(self) -> None:
         """Add work, energies stored and lost, and the error of the balance."""
