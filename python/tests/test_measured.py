@@ -278,6 +278,26 @@ def test_a_width_alone_makes_square_pixels(tmp_path):
         load(path, size=(8.0, 5.0))
 
 
+@pytest.mark.parametrize(("step", "decimals"), [(0.25, 1), (2.47, 0), (0.1234, 2), (0.333, 3)])
+def test_line_scans_with_rounded_coordinates(tmp_path, step, decimals):
+    """They used to be refused if rounding moved points by more than a tenth of their distance."""
+    kept = np.arange(400) % 37 != 5
+    table = np.column_stack([step * np.arange(400.0), np.sin(np.arange(400.0))])[kept]
+    np.savetxt(tmp_path / "line.txt", table, fmt=[f"%.{decimals}f", "%.6f"])
+    found = load(tmp_path / "line.txt", unit="um", level="none")
+    assert found.height.shape == (1, 400)
+    assert found.lx == pytest.approx(4e-4 * step, rel=10.0**-decimals / (400 * step))
+    np.testing.assert_allclose(found.height[0, kept], 1e-6 * table[:, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("decimals", [1, 2, 12])
+def test_uneven_distances_are_not_taken_for_rounded_ones(tmp_path, decimals):
+    x = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 200))
+    np.savetxt(tmp_path / "line.txt", np.column_stack([x, np.sin(x)]), fmt=f"%.{decimals}f")
+    with pytest.raises(ValueError, match="line scan with points at uneven distances"):
+        load(tmp_path / "line.txt", unit="um")
+
+
 @pytest.mark.parametrize("order", ["falling", "shuffled", "counted"])
 def test_points_of_a_line_scan_are_sorted(tmp_path, order):
     """Falling x used to give negative lengths."""

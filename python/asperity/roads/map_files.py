@@ -35,6 +35,10 @@ FloatArray = NDArray[np.float64]
 
 _METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}
 _OFF_GRID = 0.1  # largest distance of a point from a regular grid, cells
+_ROUNDING = 0.75  # the same of coordinates that are rounded, in units of their last digit ...
+_OFF_ROUNDED = 0.3  # ... and in cells
+_DIGITS = 9  # most decimal digits that a rounded coordinate has
+_NEIGHBOURS = 0.4  # least part of the gaps between coordinates that are one step
 _SPARSE = 20.0  # most cells per point that still count as a grid
 _UNEVEN = ("is a line scan with points at uneven distances: a run needs a regular grid; interpolate"
            " it first, as with numpy.interp")
@@ -337,27 +341,50 @@ def _on_grid(path: Path, table: FloatArray, unit: str | None) -> PlainMap:
 def _steps(values: FloatArray) -> tuple[NDArray[np.intp] | None, float]:
     """Return the index of each value on an evenly spaced scale, and its step.
 
-    The index is None if no such scale fits.
+    The index is None if no such scale fits. Coordinates that are rounded to a few decimals may
+    differ from the scale by about half of their last digit.
 
     Examples
     --------
     >>> _steps(np.array([0.0, 0.33, 0.67, 1.33]))[0].tolist()
     [0, 1, 2, 4]
+    >>> _steps(np.array([0.0, 0.2, 0.5, 0.8, 1.0]))[0].tolist()
+    [0, 1, 2, 3, 4]
     """
     if not len(values):
         return None, 0.0
-    first, span = float(values.min()), float(np.ptp(values))
-    distinct = np.unique(values)
+    distinct, which = np.unique(values, return_inverse=True)
     gaps = np.diff(distinct)
-    gaps = gaps[gaps > 1e-6 * span]
-    if not len(gaps):
+    wide = gaps[gaps > 1e-6 * np.ptp(values)]
+    if not len(wide):
         return None, 0.0
-    step = float(np.median(gaps))
-    # Coordinates in files are rounded, so that the whole span determines the step more accurately.
+    # Where points are missing, a gap is a multiple of the step. Coordinates in files are rounded,
+    # so that the whole span determines the step more accurately than the gaps.
+    step = float(np.mean(wide[wide < 1.6 * np.quantile(wide, 0.1)]))
     for _ in range(3):
-        number = np.rint((values - first) / step)
-        step = float(np.sum(number * (values - first)) / np.sum(number**2))
-    offset = float(np.median(values - first - number * step))
-    if np.abs(values - first - number * step - offset).max() > _OFF_GRID * step:
+        number = np.concatenate([[0.0], np.cumsum(np.rint(gaps / step))])
+        centred = number - number.mean()
+        step = float(np.sum(centred * (distinct - distinct[0])) / max(np.sum(centred**2), 1.0))
+    if np.mean(np.rint(wide / step) == 1.0) < _NEIGHBOURS:
         return None, 0.0
-    return number.astype(np.intp), step
+    off = distinct - number * step
+    most = max(_OFF_GRID * step, min(_ROUNDING * _last_digit(distinct), _OFF_ROUNDED * step))
+    if np.ptp(off) > 2.0 * most:
+        return None, 0.0
+    return number.astype(np.intp)[which], step
+
+
+def _last_digit(values: FloatArray) -> float:
+    """Return the value of the last decimal digit that some numbers have, or 0 if they have many.
+
+    Examples
+    --------
+    >>> _last_digit(np.array([0.0, 0.25, 1.5])), _last_digit(np.array([1.0 / 3.0]))
+    (0.01, 0.0)
+    """
+    largest = math.ceil(math.log10(np.abs(values).max()))
+    for power in range(largest, largest - _DIGITS, -1):
+        digits = values / 10.0**power
+        if np.abs(digits - np.rint(digits)).max() < 1e-4:
+            return 10.0**power
+    return 0.0
