@@ -257,6 +257,12 @@ contains
       call check_error(error, 'cannot be written: File name too long', 'why a file cannot be written')
       call file%open(path, 'create', error)
       call file%write('/x', [1.0_dp], 'm', 'x', error)
+      call file%close(error)
+      call cut_file(100)
+      call file%open(path, 'read', error)
+      call check_error(error, 'cannot be read: its end is missing: it has 100 of', 'file that is cut off')
+      call file%open(path, 'create', error)
+      call file%write('/x', [1.0_dp], 'm', 'x', error)
       call file%read('/y', x, error)
       call check_error(error, 'there is no dataset "/y"; there are: x', 'missing dataset')
       call file%read_attribute('/x', 'size', n, error)
@@ -268,6 +274,20 @@ contains
       call file%close(error)
       call check_no_error(error, 'close after a failure')
    end subroutine failures_are_explained
+
+   !> Keep only the first bytes of the file.
+   subroutine cut_file(length)
+      integer, intent(in) :: length
+      character(length) :: bytes
+      integer :: unit
+
+      open (newunit=unit, file=path, access='stream', status='old')
+      read (unit) bytes
+      close (unit, status='delete')
+      open (newunit=unit, file=path, access='stream', status='new')
+      write (unit) bytes
+      close (unit)
+   end subroutine cut_file
 
    !> In a chain of calls without an error argument, the first fault ends the chain. Later writes have no
    !> effect, and this fault is reported, however many follow.

@@ -76,8 +76,22 @@ contains
          first = first + len(mark)
          length = index(text(first:), '''') - 1
          if (length > 0) text = text(first:first + length - 1)
+      else if (index(text, 'truncated file') == 1) then
+         text = 'its end is missing: it has '//number_after(text, ' eof = ')//' of ' &
+            //number_after(text, 'stored_eof = ')//' bytes'
       end if
    end function last_reason
+
+   !> The digits that follow a mark in a text.
+   pure function number_after(text, mark) result(digits)
+      character(*), intent(in) :: text
+      character(*), intent(in) :: mark
+      character(:), allocatable :: digits
+      integer :: first
+
+      first = index(text, mark) + len(mark)
+      digits = text(first:first - 1 + verify(text(first:)//' ', '0123456789') - 1)
+   end function number_after
 
    !> Keep the innermost description of the error stack.
    function keep_description(n, entry_ptr, context) bind(c) result(status)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -40,11 +41,23 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
             detail = str(error.args[0] if error.args else error)
             if "locking flag" in detail:  # the caller has the file open with h5py's defaults
                 options = {}
-            reason = OSError(f"{path}: cannot be read: {detail}; if its run was killed,"
+            reason = OSError(f"{path}: cannot be read: {_in_words(detail)}; if its run was killed,"
                              " `asperity run CASE.nml --restart` continues from the last"
                              " checkpoint; otherwise run the case again")
         time.sleep(0.02 * (attempt + 1))
     raise reason from None
+
+
+def _in_words(detail: str) -> str:
+    """Return the reason that HDF5 gives for a failure, in plain words where the file is cut off.
+
+    Examples
+    --------
+    >>> _in_words("... (truncated file: eof = 10, sblock->base_addr = 0, stored_eof = 99)")
+    'its end is missing: it has 10 of 99 bytes'
+    """
+    cut = re.search(r"truncated file: eof = (\d+), .*stored_eof = (\d+)", detail)
+    return f"its end is missing: it has {cut[1]} of {cut[2]} bytes" if cut else detail
 
 
 def _check(path: Path) -> None:
