@@ -58,7 +58,7 @@ contains
       if (slides) fields = fields + merge(5.0_dp, 4.0_dp, case%solver%interpolation == 'cubic')
       if (case%adhesion%potential /= 'none') fields = fields + adhesion_fields(case)
       if (rubs) fields = fields + friction_fields(case)
-      if (any(case%phases%steady)) fields = fields + merge(122.0_dp, 28.0_dp, rubs)
+      if (any(case%phases%steady)) fields = fields + merge(114.0_dp, 28.0_dp, rubs)
       cells = real(case%grid%nx, dp)*real(case%grid%ny, dp)
       if (present(rows)) cells = real(case%grid%nx, dp)*real(rows, dp)
 
