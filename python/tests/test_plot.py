@@ -550,6 +550,20 @@ def small_disk(size=40):
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+def test_the_gap_of_full_contact_is_drawn_as_zero(tmp_path):
+    """The colours used to show the round-off of the gap, and the bar of a zero gap ended at 1 m."""
+    case = asperity.Case(grid={"nx": 16, "ny": 16, "lx": 1e-3},
+                         surface={"shape": "sine", "wavelength": 1e-3, "amplitude": 1e-6},
+                         material={"shear_modulus": 1e6}, phase={"pressure": 1e6},
+                         output={"file": str(tmp_path / "full.h5")})
+    snapshot = asperity.run(case).snapshots[-1]
+    axes = snapshot.plot("gap")
+    assert not axes.images[0].get_array().any()
+    bar = axes.images[0].colorbar
+    assert [tick.get_text() for tick in bar.ax.get_yticklabels() + bar.ax.get_xticklabels()
+            if tick.get_text()] == ["0"]
+
+
 @pytest.mark.parametrize("name", ["a.png", "a.gif", "a.html", "a.vti", "a.nml", "fit.nml",
                                   "fit.csv"])
 def test_a_full_disk_leaves_the_file_of_before(tmp_path, name):

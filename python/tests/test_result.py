@@ -164,7 +164,8 @@ def test_bad_files(tmp_path, content, message):
 
 def test_truncated_file(result):
     result.write_bytes(result.read_bytes()[: result.stat().st_size // 2])
-    with pytest.raises(OSError, match=r"rough\.h5: cannot be read: its end is missing: it has \d+ of \d+.*--restart"):
+    message = r"rough\.h5: cannot be read: its end is missing: it has \d+ of \d+ bytes; .*--restart"
+    with pytest.raises(OSError, match=message):
         asperity.open(result)
 
 

@@ -23,10 +23,11 @@ from .style import NO_CONTACT, SLIP, STICK, si_scale
 if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
 
+    from ..results import Snapshot
     from ..results.result_file import ResultFile
 
 __all__ = ["field_style", "mark_scale", "scale_ends", "scale_limit", "state_style",
-           "typical_value", "without_open_cells"]
+           "typical_value", "without_open_cells", "without_round_off"]
 
 SIGNED = ("traction_x", "traction_y", "slip_x", "slip_y", "displacement_x", "displacement_y")
 # A sign whose values are smaller than those of the other sign by this factor is not shown.
@@ -36,6 +37,7 @@ ALIKE = 0.5
 # The least part of the larger limit that the other limit is, so that values which are small against
 # all others do not get full colours.
 LEAST = 0.1
+ROUND_OFF = 1e-12  # largest gap over displacement and height of the road that is round-off
 
 
 def scale_limit(values: NDArray[Any]) -> float:
@@ -127,11 +129,17 @@ def field_style(field: NDArray[Any], name: str, units: str) -> tuple[float, str,
     return factor, unit, {"cmap": cmap, "norm": Normalize(low, high)}
 
 
-def mark_scale(bar: Colorbar, label: str) -> None:
-    """Label a colour bar, and give each half of that of a field of both signs its own ticks."""
+def mark_scale(bar: Colorbar, label: str, field: NDArray[Any]) -> None:
+    """Label a colour bar, and give each half of that of a field of both signs its own ticks.
+
+    The bar of a field that is zero everywhere, such as the gap in full contact, has no other tick
+    than zero.
+    """
     bar.set_label(label)
     norm = bar.norm
-    if isinstance(norm, TwoSlopeNorm):
+    if not field.any():
+        bar.set_ticks([0.0])
+    elif isinstance(norm, TwoSlopeNorm):
         low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
         steps = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10])
         ticks = [tick for ends in ((low, 0.0), (0.0, high)) for tick in steps.tick_values(*ends)
@@ -157,6 +165,32 @@ def without_open_cells(field: NDArray[Any], name: str) -> NDArray[Any]:
     if name == "pressure" and field.min(initial=0.0) >= 0.0:
         return np.ma.masked_less_equal(field, 0.0)
     return field
+
+
+def without_round_off(snapshot: Snapshot, name: str) -> NDArray[Any]:
+    """Return a field for a picture, in which a gap is zero if nothing but round-off is left of it.
+
+    The gap is the difference of displacement and road. In full contact it would show the last
+    digits of both.
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        The snapshot.
+    name : str
+        Name of the field; only ``"gap"`` is changed.
+
+    Returns
+    -------
+    ndarray
+        The field, shape (ny, nx), or zeros.
+    """
+    field = snapshot[name]
+    if name != "gap":
+        return field
+    largest = max((float(np.abs(snapshot[part]).max()) for part in ("displacement_z", "road_height")
+                   if part in snapshot), default=0.0)
+    return np.zeros_like(field) if np.abs(field).max() <= ROUND_OFF * largest else field
 
 
 def state_style(run: ResultFile) -> dict[str, Any]:

@@ -148,13 +148,13 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
                                      label=name) for colour, name in names],
                       loc="outside lower center", ncols=3, frameon=False)
     else:
-        factor, scale_unit, style = field_style(_sample(snapshots, field), field,
-                                                snapshots[0].units(field))
+        sample = _sample(snapshots, field)
+        factor, scale_unit, style = field_style(sample, field, snapshots[0].units(field))
         image = panel.imshow(without_open_cells(snapshots[0][field] * factor, field),
                              origin="lower", extent=edges, aspect=stretch, **style)
         tall = float(np.clip(grid.ly / grid.lx, 0.1, 2.5))  # the bar is as tall as the map
         bar = figure.colorbar(image, ax=panel, fraction=0.046 * tall, pad=0.03)
-        mark_scale(bar, axis_text(label_of(field, snapshots[0]), scale_unit))
+        mark_scale(bar, axis_text(label_of(field, snapshots[0]), scale_unit), sample)
     write_lengths(panel, unit, stretch)
 
     along, column, mark = _curve(run, curve)

@@ -19,6 +19,7 @@ from .colour_scales import (
     state_style,
     typical_value,
     without_open_cells,
+    without_round_off,
 )
 from .style import (
     COLOURS,
@@ -69,7 +70,7 @@ def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = Non
         The axes; the figure is ``axes.figure``.
     """
     grid = snapshot.run.grid
-    field = snapshot[name]
+    field = without_round_off(snapshot, name)
     with print_style() if ax is None else nullcontext():
         if ax is None:
             ratio = 0.55 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.25, 2.0))
@@ -113,12 +114,14 @@ def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
         The axes of the pressure.
     """
     grid = snapshot.run.grid
-    pressure, gap = snapshot["pressure"], snapshot["gap"]
+    pressure, gap = snapshot["pressure"], without_round_off(snapshot, "gap")
     row = int(np.unravel_index(np.argmax(pressure), pressure.shape)[0])
     axes = ax if ax is not None else _new_axes((SINGLE_COLUMN, 2.4))
     _profile(grid, pressure[row], "Pressure", snapshot.units("pressure"), axes)
     other = axes.twinx()
     _profile(grid, gap[row], "Gap", snapshot.units("gap"), other, COLOURS[1], "--")
+    if not gap[row].any():
+        other.set_yticks([0.0])
     other.grid(visible=False)
     for panel, colour in ((axes, COLOURS[0]), (other, COLOURS[1])):
         panel.yaxis.label.set_color(colour)
@@ -232,7 +235,7 @@ def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axe
     bar = axes.figure.colorbar(image, ax=axes, extend=extend,
                                **({"orientation": "horizontal", "pad": 0.12} if lies
                                   else {"fraction": 0.046 * ratio, "pad": 0.03}))
-    mark_scale(bar, text)
+    mark_scale(bar, text, field)
     write_lengths(axes, length_unit, stretch)
 
 

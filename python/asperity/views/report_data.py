@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..results.derived import travel
 from ..results.settings import has_friction
 from ..roads import surface
-from .colour_scales import scale_ends
+from .colour_scales import scale_ends, without_round_off
 from .plot_fields import traction_samples
 from .report_charts import MOST_SNAPSHOTS, charts_of
 from .style import label_of
@@ -168,7 +168,7 @@ def _snapshot(snapshot: Snapshot, block: int) -> dict[str, Any]:
         names += ["traction_x", "traction_y"]
     for name in names:
         if name in snapshot:
-            field = snapshot[name]
+            field = without_round_off(snapshot, name)
             if name.startswith("traction") and not np.any(field):
                 continue
             found["fields"][name] = {
