@@ -300,7 +300,7 @@ def test_columns_and_units_are_recognised(tmp_path, head, to_omega, to_storage, 
     np.testing.assert_allclose(table.storage, to_storage * a, rtol=1e-12)
     np.testing.assert_allclose(table.loss, to_loss * b, rtol=1e-12)
     assert table.temperature is None
-    assert any("taken as" in note for note in table.notes) == (head.split(",")[0] in
+    assert any("unit: taken as" in note for note in table.notes) == (head.split(",")[0] in
                                                                ("frequency", "omega"))
 
 
@@ -398,7 +398,7 @@ def test_exports_as_instruments_write_them(tmp_path):
     np.testing.assert_allclose(table.storage, 1e6 * np.array([1.125, 1.225, 1.325] * 2))
     np.testing.assert_allclose(table.loss, 1e6 * np.array([0.1, 0.2, 0.3] * 2))
     np.testing.assert_allclose(table.temperature, [10.0] * 3 + [20.0] * 3)
-    assert table.notes == []
+    assert len(table.notes) == 1 and "of shear or of tension: taken as shear" in table.notes[0]
     path.write_text(path.read_text().replace("2,5;1,225;0,2", "2,5;;0,2"))
     table = read_dma(path)
     assert table.storage.size == 4
@@ -773,3 +773,37 @@ def test_arguments_of_another_type_are_named(tmp_path):
         fit_dma("a.csv")
     with pytest.raises(ValueError, match=r"^wlf = 3\.0: must be \(c1, c2\) or \(c1, c2, t_ref\)$"):
         fit_dma(read_dma(path), wlf=3.0)
+
+
+@pytest.mark.parametrize(("heads", "kind", "noted"), [
+    ("G',G''", None, False), ("E',E''", None, False), ("storage,loss", None, True),
+    ("Storage modulus,Loss modulus", "shear", False), ("storage,loss", "tension", False),
+    ("shear storage modulus,shear loss modulus", None, False)])
+def test_a_table_that_does_not_say_its_kind_is_noted(tmp_path, heads, kind, noted):
+    """Most tables are of tension, whose moduli are three times as large."""
+    path = tmp_path / "dma.csv"
+    path.write_text(f"f (Hz),{heads}\nHz,MPa,MPa\n1,2,0.5\n10,3,0.9\n99,4,2\n")
+    notes = read_dma(path, kind=kind).notes
+    assert any("of shear or of tension: taken as shear" in note for note in notes) == noted
+
+
+def test_temperatures_below_absolute_zero_are_refused(tmp_path):
+    path = tmp_path / "dma.csv"
+    path.write_text("f (Hz),G' (MPa),G'' (MPa),T (K)\n1,2,0.5,20\n10,3,0.9,20\n99,4,2,-5\n")
+    with pytest.raises(ValueError, match=r"line 4: temperature = -278\.15 C: must be >= -273"):
+        read_dma(path)
+
+
+def test_a_column_has_one_role(tmp_path):
+    path = tmp_path / "dma.csv"
+    path.write_text("f (Hz),G' (MPa),G'' (MPa)\n1,2,0.5\n10,3,0.9\n99,4,2\n")
+    with pytest.raises(ValueError, match="storage and loss are the same column, \"G'\""):
+        read_dma(path, columns={"storage": "G'", "loss": "G'"})
+
+
+def test_shifts_of_a_single_sweep_write_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dma.csv").write_text("f (Hz),G' (MPa),G'' (MPa)\n1,2,0.5\n10,3,0.9\n99,4,2\n")
+    assert main(["fit", "dma.csv", "-o", "a.nml", "--plot", "a.png", "--shifts", "s.csv"]) == 2
+    assert "there are no shifts to write" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["dma.csv"]

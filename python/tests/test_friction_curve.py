@@ -71,6 +71,40 @@ def test_the_plan_knows_the_number_of_transforms(ratio, law, tmp_path):
     assert 0.4 < np.mean(run.history.ffts) / plan.transforms(20.0) < 2.5
 
 
+@pytest.mark.parametrize(("options", "note"), [
+    (dict(speeds=[1e-3, 1e5]), "at 100000 m/s the inertia of the rubber counts"),
+    (dict(pressures=[2e9]), r"a pressure of 2e\+09 Pa is 2e\+03 times the relaxed modulus"),
+    (dict(pressures=[0.2]), "a pressure of 0.2 Pa is only 2e-07 of the relaxed modulus"),
+    (dict(coefficient=30.0, slope_effect=True), "the coefficient times the rms slope of the road"),
+])
+def test_the_plan_doubts_values_in_another_unit(options, note):
+    assert sum(re.match(note, one) is not None for one in small_plan(**options).notes) == 1
+    assert not any(re.match(note, one) for one in small_plan().notes)
+
+
+def test_a_fitted_namelist_keeps_the_measured_range(tmp_path):
+    """The notes on unmeasured frequencies and temperatures used to come with tables only."""
+    omega = np.geomspace(1.0, 1e3, 16)
+    rows = ["f (rad/s),G' (Pa),G'' (Pa),T (C)"]
+    for celsius in (0.0, 10.0, 20.0, 30.0):
+        modulus = RUBBER.shifted(celsius, LAW).complex_modulus(omega)
+        rows += [f"{w!r},{g.real!r},{g.imag!r},{celsius}" for w, g in zip(
+            omega.tolist(), modulus.tolist(), strict=True)]
+    (tmp_path / "dma.csv").write_text("\n".join(rows) + "\n")
+    fit = asperity.dma.fit_dma(asperity.dma.read_dma(tmp_path / "dma.csv"), reference=20.0)
+    (tmp_path / "fit.nml").write_text(fit.to_namelist())
+    notes = [plan_curve(road_of([ROAD], cells=32), compound_of(tmp_path / name), patches=1,
+                        pressures=[2e5], speeds=[1e-6, 1e-2], temperatures=[20.0, 293.0]).notes
+             for name in ("dma.csv", "fit.nml")]
+    for found in notes:
+        assert sum("the measured frequencies" in note for note in found) >= 2
+        assert sum("293 °C: the rubber was measured from 0 to 30 °C only" in note
+                   for note in found) == 1
+    with pytest.raises(ValueError, match=r"temperatures: -300 C: must be >= -273\.15 C"):
+        plan_curve(road_of([ROAD], cells=32), compound_of(tmp_path / "fit.nml"), speeds=[1.0],
+                   pressures=[2e5], temperatures=[-300.0])
+
+
 # ---- statistics ------------------------------------------------------------------------------
 
 
@@ -167,6 +201,15 @@ class HardPlan(CurvePlan):
         case.solver.max_iterations = 1
         case.solver.tolerance = 1e-12
         return case
+
+
+def test_a_warning_about_each_patch_is_one_remark(tmp_path):
+    """The file of the patch in a warning used to make each of them a kind of its own."""
+    road = ROAD.replace("rms_slope=0.15", "rms_slope=9")
+    plan = plan_curve(road_of([road], cells=32), COMPOUND, speeds=[1e-2], pressures=[2e5],
+                      patches=3)
+    found = [line for line in curve_of(plan, tmp_path).warnings if "the slope of the map" in line]
+    assert len(found) == 1 and "1 of 1 point (0.01 m/s)" in found[0]
 
 
 def test_points_without_an_interval_add_no_patches(curve):

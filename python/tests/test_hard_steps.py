@@ -4,6 +4,7 @@ import contextlib
 import subprocess
 import sys
 
+import h5py
 import numpy as np
 import pytest
 from conftest import ROOT
@@ -135,3 +136,48 @@ def test_failed_tangential_solve_names_slopes_that_wedge(program, tmp_path, slop
     assert done.returncode == 4
     assert "did not converge: friction: the limit of iterations was reached" in done.stderr
     assert ("% of the normal force is on slopes above 1/coefficient" in done.stderr) == wedges
+
+
+# Roads as rough as they are long, over which a block slides at a given approach. It loses the
+# contact and touches again.
+LOST = {
+    "four cells": ([-0.34314475552229695, -0.3774437880377766, -0.03420613952471276,
+                    0.34180412777054203], 0.765, "shear_modulus = 1, prony_g = 3.5, prony_tau = 1"
+                   ", thickness = 0.5", 0.0145, 0.01136, "'step'", 9, 3.0, 0.6134508),
+    "five cells": ([0.39, -0.17, -0.55, 0.09, -0.45], 0.8, "shear_modulus = 1", 0.01, -0.005,
+                   "'linear'", 8, 1.0, 0.89),
+    "six cells": ([-0.44, -0.05, 0.08, 0.26, 0.2, -0.44], 0.8,
+                  "shear_modulus = 1, thickness = 0.5, density = 0.4", 0.01, 0.005, "'linear'", 8,
+                  1.0, 0.94),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_a_contact_that_is_lost_and_found(tmp_path, name):
+    """Rows used to hold the pressure of one contact and the traction of another, or no numbers."""
+    heights, coefficient, material, first, last, ramp, steps, duration, speed = LOST[name]
+    with h5py.File(tmp_path / "road.h5", "w") as file:
+        file["surface"] = np.array([heights])
+    case = tmp_path / "case.nml"
+    case.write_text(f"""
+        &grid nx = {len(heights)}, ny = 1, lx = 1, ly = {1 / len(heights)!r} /
+        &surface shape = 'file', file = 'road.h5' /
+        &material {material} /
+        &friction law = 'coulomb', coefficient = {coefficient} /
+        &phase displacement = {first} /
+        &phase displacement = {last}, duration = {duration}, steps = {steps}, ramp = {ramp},
+               velocity_x = {speed} /
+        &output snapshot_every = 1, checkpoint_minutes = 0 /
+        """)
+    with contextlib.suppress(asperity.NotConverged):
+        asperity.run(case)
+    run = asperity.open(tmp_path / "case.h5")
+    assert all(np.isfinite(run.history[column]).all() for column in run.history)
+    settled = run.history["residual_coupling"] <= 1e-6
+    for row, snapshot in enumerate(run.snapshots[1:], 1):
+        if not settled[row]:
+            continue
+        pressure, gap, contact = (snapshot[field] for field in ("pressure", "gap", "contact"))
+        traction = np.hypot(snapshot["traction_x"], snapshot["traction_y"])
+        assert np.all((contact > 0) == ((pressure > 0.0) | ((contact > 0) & (gap < 1e-4))))
+        assert np.all(traction[gap > 1e-4] == 0.0)

@@ -278,6 +278,51 @@ def test_a_width_alone_makes_square_pixels(tmp_path):
         load(path, size=(8.0, 5.0))
 
 
+@pytest.mark.parametrize(("place", "word", "layout"), [
+    ((0, 3), "0.1x4", " "), ((0, 3), "O.25", " "), ((0, 0), "-0.3l", ";"), ((0, 2), "0,1S2", ";")])
+def test_a_typing_error_in_the_first_line_is_an_error(tmp_path, place, word, layout):
+    """The line used to be taken for a heading, so that the map lost a row."""
+    words = [[f"{value:.4f}" for value in row] for row in sample()]
+    words[place[0]][place[1]] = word
+    path = tmp_path / "map.txt"
+    path.write_text("\n".join(layout.join(row) for row in words) + "\n")
+    found = re.escape(f"line 1: column {place[1] + 1} = '{word}': must be a number")
+    with pytest.raises(ValueError, match=found):
+        load(path, unit="um", size=(2, 1))
+
+
+def test_a_typing_error_in_the_first_point_is_an_error(tmp_path):
+    path = tmp_path / "line.txt"
+    path.write_text("x z\n0.0 0.1S\n" + "".join(f"{0.5 * i} {0.1 * i % 1}\n" for i in range(1, 30)))
+    with pytest.raises(ValueError, match=r"line 2: column 2 = '0.1S': must be a number"):
+        load(path, unit="um")
+
+
+@pytest.mark.parametrize("corner", ["", "1", "y\\x [mm]"])
+@pytest.mark.parametrize("separator", ["\t", ";", ","])
+def test_coordinates_beside_a_matrix_are_no_heights(tmp_path, corner, separator):
+    x, y = 0.05 * np.arange(30), 0.1 * np.arange(20)
+    heights = np.random.default_rng(1).normal(size=(20, 30))
+    rows = [[corner, *(f"{value:.2f}" for value in x)],
+            *([f"{at:.2f}", *(f"{value:.4f}" for value in row)]
+              for at, row in zip(y, heights, strict=True))]
+    path = tmp_path / "map.csv"
+    path.write_text("\n".join(separator.join(row) for row in rows) + "\n")
+    with pytest.raises(ValueError, match=r"its first (column|row) rises evenly from .*no heights"):
+        load(path, unit="mm", size=(1.5, 2.0))
+
+
+def test_marks_of_missing_points_are_no_heights(tmp_path):
+    heights = sample()
+    heights[1, 2] = heights[3, 3] = -9999.0
+    np.savetxt(tmp_path / "map.txt", heights)
+    with pytest.raises(ValueError, match=r"-9999 occurs 2 times, far from all other heights"):
+        load(tmp_path / "map.txt", unit="um", size=(2, 1))
+    heights[heights == -9999.0] = np.nan
+    np.savetxt(tmp_path / "map.txt", heights)
+    assert load(tmp_path / "map.txt", unit="um", size=(2, 1), max_missing=0.5).rms_height < 1e-5
+
+
 @pytest.mark.parametrize(("step", "decimals"), [(0.25, 1), (2.47, 0), (0.1234, 2), (0.333, 3)])
 def test_line_scans_with_rounded_coordinates(tmp_path, step, decimals):
     """They used to be refused if rounding moved points by more than a tenth of their distance."""

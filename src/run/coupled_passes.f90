@@ -57,6 +57,7 @@ module coupled_passes
    use anderson, only : anderson_type, new_anderson
    use carried_field, only : carry
    use contact_model, only : contact_mean, contact_type, solve_normal
+   use contact_rule, only : touches
    use coupling_mismatch, only : mismatch_of
    use asperity_interpolation, only : displaced
    use field_copies, only : copy_field
@@ -251,7 +252,11 @@ contains
       normal%stopped = part%stopped
       if (normal%stopped) return
       call add_result(normal, part)
-      if (self%sharing) call update_shares(self, contact)
+      if (self%sharing) then
+         call update_shares(self, contact)
+      else if (allocated(contact%tangential%share)) then
+         call confirm_shares(contact)
+      end if
       contact%tangential%tolerance = accuracy
       call contact%tangential%solve(contact%state%tangential, contact%state%pressure, contact%state%gap, &
          contact%slope_x, contact%slope_y, part)
@@ -272,6 +277,27 @@ contains
          contact%tangential%share)
       self%place_residual(:, 3, :) = self%edge%share_length*contact%tangential%share - self%place(:, 3, :)
    end subroutine update_shares
+
+   !> Restrict the shares of a joint solution to the contact that the normal solve has found at its place: cells with
+   !> pressure obey the whole law, and open cells carry no traction. The share of the joint solution remains only in
+   !> cells that touch without pressure, so that the pass verifies this solution and no other one.
+   subroutine confirm_shares(contact)
+      class(contact_type), intent(inout) :: contact
+      real(dp) :: apart                                  !! least gap of a cell that is open for certain, m
+      integer :: j
+
+      apart = contact%case%solver%tolerance*contact%rms_height
+      !$omp parallel do default(none) shared(contact, apart) private(j)
+      do j = 1, contact%grid%rows()
+         associate (share => contact%tangential%share(:, j), gap => contact%state%gap(:, j))
+            where (touches(contact%normal%adhesive, contact%state%pressure(:, j), gap))
+               share = 1.0_dp
+            else where (gap > apart)
+               share = 0.0_dp
+            end where
+         end associate
+      end do
+   end subroutine confirm_shares
 
    !> Compute the first place of a row: the displacement of the row before, moved along with the contact, which
    !> follows the road over the rubber, plus the mean motion of the rubber's surface, plus the forecast of module

@@ -6,7 +6,8 @@
 !> contain cells that carry little pressure, or none although they should. The third number shows these: the sum of the
 !> lengths by which the road at U_T overlaps the surface or leaves it, divided by the number of cells with pressure and
 !> by the rms height. A cell that the road leaves counts at most with the length by which its own pressure compresses
-!> it, since it then opens. With constant shear a cell with hardly any pressure carries as much traction as any other,
+!> it, since it then opens. (After a step that was solved for all unknowns at once, a cell may touch without pressure and
+!> carry traction. It counts with the whole difference of the heights.) With constant shear a cell with hardly any pressure carries as much traction as any other,
 !> and none of these shows whether it obeys the law. In that case the sum of the errors of all cells (module
 !> `edge_shares`) counts as well.
 !>
@@ -21,6 +22,7 @@ module coupling_mismatch
    use contact_model, only : contact_type
    use edge_shares, only : edge_rule_type
    use field_sums, only : row_totals
+   use friction_law, only : contact_open
    implicit none
    private
 
@@ -50,9 +52,9 @@ contains
          contact%tangential%trial(:, 2, :), height, slope_x, slope_y)
       compliance = contact%tangential%cell_compliance()
       allocate (rows(size(sums), contact%grid%rows()))
-      !$omp parallel do default(none) shared(contact, compliance, height, slope_x, slope_y, rows) private(j)
+      !$omp parallel do default(none) shared(contact, sharing, compliance, height, slope_x, slope_y, rows) private(j)
       do j = 1, contact%grid%rows()
-         call compare_row(contact, j, compliance, height(:, j), slope_x(:, j), slope_y(:, j), rows(:, j))
+         call compare_row(contact, j, sharing, compliance, height(:, j), slope_x(:, j), slope_y(:, j), rows(:, j))
       end do
       sums = row_totals(rows)
       edges = 0.0_dp
@@ -74,9 +76,10 @@ contains
    end function mismatch_of
 
    !> Compare the road of a pass with that at U_T along a row, and put the cells without pressure over the latter.
-   pure subroutine compare_row(contact, j, compliance, height, slope_x, slope_y, sums)
+   pure subroutine compare_row(contact, j, sharing, compliance, height, slope_x, slope_y, sums)
       class(contact_type), intent(inout) :: contact
       integer, intent(in) :: j
+      logical, intent(in) :: sharing                   !! cells that touch without pressure are compared elsewhere
       real(dp), intent(in) :: compliance               !! of a cell, m/Pa
       real(dp), intent(in) :: height(:), slope_x(:), slope_y(:)     !! of the road at U_T
       !> Sums of the pressure; with the pressure as weight, of the differences in height and in slope, and of the slope;
@@ -99,6 +102,10 @@ contains
             sums(4) = sums(4) + p*sqrt(contact%slope_x(i, j)**2 + contact%slope_y(i, j)**2)
             sums(6) = sums(6) + 1.0_dp
          else
+            if (.not. sharing .and. contact%state%tangential%contact(i, j) /= contact_open) then
+               sums(5) = sums(5) + abs(contact%height(i, j) - height(i))
+               sums(6) = sums(6) + 1.0_dp
+            end if
             contact%state%gap(i, j) = contact%state%gap(i, j) + (contact%height(i, j) - height(i))
             contact%height(i, j) = height(i)
             contact%slope_x(i, j) = slope_x(i)

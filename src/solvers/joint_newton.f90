@@ -106,7 +106,8 @@ contains
          call take_step(self, system, step, k)
          self%steps = k
       end do
-      solved = self%now%worst <= goal
+      ! Residuals that are no numbers are not among the largest ones.
+      solved = self%now%worst <= goal .and. self%now%merit < huge(1.0_dp)
    end subroutine iterate
 
    !> Has the residual not been halved in the number of steps that are allowed for it?

@@ -9,7 +9,8 @@
 !>     mean of P = load                 or the level is given
 !>
 !> Each equation is scaled: lengths by the depth to which the mean pressure of the contact presses a cell, and
-!> tractions by that pressure or by the strength, whichever is larger.
+!> tractions by that pressure or by the strength, whichever is larger. If the contact has been lost, the pressure that
+!> presses a cell in by the height of the road over its width takes the place of the mean pressure.
 !>
 !> An approximate inverse of the derivative of the equations couples the cells of small tiles completely (module
 !> `joint_tiles`). The level follows from the load: the tiles also give the change of all unknowns with the level.
@@ -29,6 +30,7 @@ module joint_system
 
    real(dp), parameter :: part_of_cell = 1.0e-4_dp     !! distance of two places where slopes are compared
    real(dp), parameter :: least_slope = 0.05_dp        !! of the road, in the width of the second range of s
+   real(dp), parameter :: least_pressure = 1.0e-9_dp   !! below which a contact is taken as lost, in natural units
 
    !> A state of all cells, and its residuals.
    type :: joint_state_type
@@ -271,15 +273,17 @@ contains
       logical, intent(in) :: touching(:, :)
       real(dp), intent(in) :: pressure(:, :)           !! Pa
       real(dp), intent(in) :: rms_slope                !! of the road
-      real(dp) :: slope
+      real(dp) :: slope, natural
 
       associate (rules => self%rules)
+         slope = max(rms_slope, least_slope)
+         natural = slope*self%grid%cell_side()/rules%soft
          self%root = sqrt(max(real(field_count(touching), dp), 1.0_dp))
-         self%unit_pressure = max(field_sum(abs(pressure)), tiny(1.0_dp))/self%grid%cells()
-         self%unit_traction = self%unit_pressure*self%grid%cells()/self%root**2
+         self%unit_traction = field_sum(abs(pressure))/self%root**2
+         if (.not. self%unit_traction > least_pressure*natural) self%unit_traction = natural
+         self%unit_pressure = self%unit_traction*self%root**2/self%grid%cells()
          self%unit_length = rules%soft*self%unit_traction
          self%unit_traction = max(self%unit_traction, rules%law%bare_strength())
-         slope = max(rms_slope, least_slope)
          rules%width = rules%soft_along*slope*self%unit_traction
          if (rules%law%jumps_at_edge()) rules%width = rules%soft_along*slope*rules%law%bare_strength()
       end associate

@@ -102,11 +102,6 @@ def add_fit(verbs: Any) -> None:
                         help="smallest plateau modulus as a share of the lowest storage modulus"
                              " (default: 0.01)")
     add_columns(parser, "the table")
-    parser.add_argument("--frequency-unit", metavar="UNIT", help="Hz, kHz, mHz, rad/s or krad/s")
-    parser.add_argument("--modulus-unit", metavar="UNIT", help="Pa, kPa, MPa or GPa")
-    parser.add_argument("--temperature-unit", metavar="UNIT", help="C or K")
-    parser.add_argument("--kind", choices=("shear", "tension"),
-                        help="kind of the moduli; default: by the header, otherwise shear")
     parser.add_argument("--poisson", type=float, default=0.5, metavar="NU",
                         help="Poisson ratio (default: 0.5)")
     parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
@@ -127,21 +122,30 @@ def add_fit(verbs: Any) -> None:
 
 
 def add_columns(parser: argparse.ArgumentParser, table: str) -> None:
-    """Add the option that names the columns of a DMA table."""
+    """Add the options that say what the columns of a DMA table are."""
     parser.add_argument("--column", action="append", default=[], metavar="ROLE=NAME|N",
                         help=f"name or number (from 1) of the column of {table} for a role:"
                              " frequency, storage, loss, temperature or tan_delta; may be repeated")
+    parser.add_argument("--frequency-unit", metavar="UNIT",
+                        help=f"of {table}: Hz, kHz, mHz, rad/s or krad/s")
+    parser.add_argument("--modulus-unit", metavar="UNIT", help=f"of {table}: Pa, kPa, MPa or GPa")
+    parser.add_argument("--temperature-unit", metavar="UNIT", help=f"of {table}: C or K")
+    parser.add_argument("--kind", choices=("shear", "tension"),
+                        help=f"kind of the moduli of {table}; default: by the header, otherwise"
+                             " shear")
 
 
-def columns_of(chosen: argparse.Namespace) -> dict[str, str]:
-    """Return the names or numbers of the columns by their roles."""
+def columns_of(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of `add_columns` as arguments of `asperity.dma.read_dma`."""
     columns = {}
     for given in chosen.column:
         role, equals, name = given.partition("=")
         if not equals or not name.strip():
             raise ValueError(f"--column {given}: must be ROLE=NAME or ROLE=NUMBER")
         columns[role.strip()] = name.strip()
-    return columns
+    return {"columns": columns, "frequency_unit": chosen.frequency_unit,
+            "modulus_unit": chosen.modulus_unit, "temperature_unit": chosen.temperature_unit,
+            "kind": chosen.kind}
 
 
 def _check_outputs(chosen: argparse.Namespace) -> None:
@@ -188,14 +192,13 @@ def _fit(chosen: argparse.Namespace) -> int:
 
     _check_outputs(chosen)
     output = chosen.output
-    table = read_dma(
-        chosen.table, columns=columns_of(chosen), frequency_unit=chosen.frequency_unit,
-        modulus_unit=chosen.modulus_unit, temperature_unit=chosen.temperature_unit,
-        kind=chosen.kind, poisson=chosen.poisson)
+    table = read_dma(chosen.table, poisson=chosen.poisson, **columns_of(chosen))
     fit = fit_dma(
         table, arms_per_decade=chosen.arms_per_decade, reference=chosen.reference,
         wlf=chosen.wlf, temperature_tolerance=chosen.temperature_tolerance,
         least_plateau=chosen.least_plateau, vertical=chosen.vertical)
+    if chosen.shifts is not None:
+        fit.check_sweeps()
     group = sealed(fit.to_namelist(poisson=chosen.poisson, temperature=chosen.temperature) + "\n")
     messages = sys.stdout
     if output is None:

@@ -196,8 +196,9 @@ def _friction(chosen: argparse.Namespace) -> int:
                    short=chosen.short, outliers=chosen.outliers, draw=chosen.draw,
                    seed=chosen.seed, **options)
     compound = compound_of(chosen.material, wlf=chosen.wlf, reference=chosen.reference,
-                           vertical=chosen.vertical, columns=columns_of(chosen),
-                           temperature_tolerance=chosen.temperature_tolerance)
+                           vertical=chosen.vertical,
+                           temperature_tolerance=chosen.temperature_tolerance,
+                           **columns_of(chosen))
     plan = plan_curve(road, compound, speeds=chosen.speeds, pressures=chosen.pressures,
                       temperatures=chosen.temperatures, patches=chosen.patches,
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,

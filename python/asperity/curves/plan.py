@@ -16,7 +16,9 @@ from ..base.check import array_of, number, positive, whole
 from ..base.durations import duration
 from ..base.names import counted
 from ..roads.patches import DrawnRoad, MeasuredRoad, Patch
+from ..roads.statistics import statistics
 from ..rubber.compound import Compound
+from ..rubber.dma_columns import ABSOLUTE_ZERO
 from ..runs.case import Case
 
 __all__ = ["CurvePlan", "plan_curve"]
@@ -36,6 +38,9 @@ _OTHER_WORK = 8.0
 _RUN, _COMMAND = 0.02, 2.5
 _RANGE = 1e-30, 1e30    # allowed speeds, m/s, and pressures, Pa
 _LARGEST_COEFFICIENT = 1000.0  # that of steady phases
+_MOST_PRESSURE, _LEAST_PRESSURE = 40.0, 1e-5  # usual pressures, over the relaxed modulus
+_MOST_SPEED = 100.0     # m/s, far above the speed of shear waves in rubber
+_WEDGING = 0.4          # coefficient times rms slope from which a road may wedge the rubber
 _COMMAND_MEMORY = 130e6  # bytes, for the command itself
 
 
@@ -287,8 +292,11 @@ def plan_curve(
                      number("coefficient", coefficient, 0.0, _LARGEST_COEFFICIENT), slope_effect,
                      number("angle", angle, -360.0, 360.0), positive("tolerance", tolerance), notes)
     for celsius in temperature:
+        if celsius < ABSOLUTE_ZERO:
+            raise ValueError(f"temperatures: {celsius:g} C: must be >= {ABSOLUTE_ZERO:g} C")
         compound.at(float(celsius))
         notes += _band_note(plan, float(celsius))
+    notes += [*_temperature_note(compound, temperature), *_load_notes(plan)]
     if road.is_measured and angle % 90.0 == 0.0:
         notes.append("sliding along an axis of a periodic patch the rubber meets its own footprint"
                      " after one side; an oblique direction (angle, --angle) avoids it")
@@ -310,6 +318,44 @@ def _longest(plan: CurvePlan) -> float:
     patch = plan.road.patch(0)
     return min(max(patch.lx, patch.ly), plan.road.whole_spectrum.band[0]) \
         if not plan.road.is_measured else max(patch.lx, patch.ly)
+
+
+def _temperature_note(compound: Compound, temperature: FloatArray) -> list[str]:
+    """Return a note on temperatures outside those at which the rubber was measured."""
+    if not compound.shifts:
+        return []
+    low, high = min(compound.shifts), max(compound.shifts)
+    outside = [f"{celsius:g}" for celsius in temperature if not low <= celsius <= high
+               and not math.isnan(celsius)]
+    return [f"{', '.join(outside)} °C: the rubber was measured from {low:g} to {high:g} °C only;"
+            " its shift there is extrapolated"] if outside else []
+
+
+def _load_notes(plan: CurvePlan) -> list[str]:
+    """Return notes on pressures, speeds and coefficients that are often in another unit."""
+    modulus, notes = plan.compound.series.g_inf, []
+    if plan.pressure[-1] > _MOST_PRESSURE * modulus:
+        notes.append(f"a pressure of {plan.pressure[-1]:g} Pa is {plan.pressure[-1] / modulus:.3g}"
+                     f" times the relaxed modulus, {modulus:.3g} Pa: is one of them in another"
+                     " unit?")
+    if plan.pressure[0] < _LEAST_PRESSURE * modulus:
+        notes.append(f"a pressure of {plan.pressure[0]:g} Pa is only"
+                     f" {plan.pressure[0] / modulus:.2g} of the relaxed modulus, {modulus:.3g} Pa:"
+                     " few cells will touch; is it in another unit?")
+    if plan.speed[-1] > _MOST_SPEED:
+        notes.append(f"at {plan.speed[-1]:g} m/s the inertia of the rubber counts, which the model"
+                     " leaves out: speeds must be far below those of its waves, tens of m/s")
+    wedging = plan.coefficient * _rms_slope(plan.road.patch(0)) if plan.slope_effect else 0.0
+    if wedging > _WEDGING:
+        notes.append(f"the coefficient times the rms slope of the road is {wedging:.2g}: above"
+                     f" about {_WEDGING:g} parts of the contact are so steep that friction holds"
+                     " any force uphill, and states may end without a solution")
+    return notes
+
+
+def _rms_slope(patch: Patch) -> float:
+    """Return the rms slope of a patch."""
+    return statistics(patch.height, patch.lx, patch.ly, "periodic").rms_slope_differences
 
 
 def _band_note(plan: CurvePlan, celsius: float) -> list[str]:

@@ -16,13 +16,14 @@ __all__ = ["remarks_of"]
 
 _STEP = re.compile(r"step (\d+), t = \S+ s: (.*)")
 _PHASE = re.compile(r"&phase (\d+): (.*)")
+_FILE = re.compile(r"file = '[^']*'")
 _NUMBER = re.compile(r"[-+]?\d[\d.]*([eE][-+]?\d+)?")
 
 
 def remarks_of(plan: CurvePlan, pieces: list[Piece]) -> list[CurveRemark]:
     """Return a remark for each kind of warning, and for each reason of states without a solution.
 
-    Warnings that differ in their numbers alone are of one kind.
+    Warnings that differ in their numbers alone, or in the file of the patch, are of one kind.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def remarks_of(plan: CurvePlan, pieces: list[Piece]) -> list[CurveRemark]:
         if not finished:
             said.append((True, rows, _reason(run.outcome)))
         for is_lost, row, text in said:
-            kind = (is_lost, _NUMBER.sub("#", text))
+            kind = (is_lost, _NUMBER.sub("#", _FILE.sub("", text)))
             found.setdefault(kind, []).append(
                 ((piece.i, piece.j, piece.first + row, piece.patch), text))
     remarks = []

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..base.check import positive, shown
-from ..base.tables import is_number, text_lines
+from ..base.tables import is_number, text_lines, text_of
 from ..roads.measured import MeasuredSurface, load
 from ..roads.patches import DrawnRoad, MeasuredRoad, cleaned
 from ..roads.spectra import Spectrum, join_spectra, spectrum_of_map
@@ -269,6 +269,7 @@ def compound_of(
     arms_per_decade: float = 1.0,
     temperature_tolerance: float | None = None,
     columns: Mapping[str, str | int] | None = None,
+    **reading: Any,
 ) -> Compound:
     """Return the rubber of a namelist with ``&material``, of a DMA table, or of a Prony series.
 
@@ -281,6 +282,8 @@ def compound_of(
         As in `asperity.dma.fit_dma`, for tables.
     columns : mapping, optional
         Columns of a table by role, as in `asperity.dma.read_dma`.
+    **reading
+        Units and kind of the moduli of a table, as in `asperity.dma.read_dma`.
 
     Returns
     -------
@@ -307,12 +310,15 @@ def compound_of(
         for name, value in (("wlf", wlf), ("reference", reference), ("vertical", vertical or None),
                             ("temperature_tolerance (--temperature-tolerance)",
                              temperature_tolerance),
-                            ("columns (--column)", columns or None)):
+                            ("columns (--column)", columns or None),
+                            *((f"{name} (--{name.replace('_', '-')})", value)
+                              for name, value in reading.items())):
             if value is not None:
                 raise ValueError(f"{name}: is for DMA tables only: {path} is a namelist, which has"
                                  " its own wlf_c1, wlf_c2 and reference_temperature")
         return _of_namelist(path)
-    fit = fit_dma(read_dma(path, columns=columns), wlf=wlf, reference=reference, vertical=vertical,
+    table = read_dma(path, columns=columns, **reading)
+    fit = fit_dma(table, wlf=wlf, reference=reference, vertical=vertical,
                   arms_per_decade=arms_per_decade, **(
                       {} if temperature_tolerance is None
                       else {"temperature_tolerance": temperature_tolerance}))
@@ -341,4 +347,20 @@ def _of_namelist(path: Path) -> Compound:
         wlf = WLF(float(group.wlf_c1), float(group.wlf_c2), reference)
     given = reference if group.temperature is None else float(group.temperature)
     poisson = positive("poisson", group.poisson) if group.poisson else 0.0
-    return Compound(series, reference, wlf, name=path.name, poisson=poisson, usual=given)
+    valid_range, shifts = _of_comments(path)
+    return Compound(series, reference, wlf, shifts if wlf else {}, valid_range=valid_range,
+                    name=path.name, poisson=poisson, usual=given)
+
+
+def _of_comments(path: Path) -> tuple[tuple[float, float] | None, dict[float, float]]:
+    """Return the measured frequencies and the shifts that `asperity fit` writes as comments."""
+    found: tuple[float, float] | None = None
+    shifts: dict[float, float] = {}
+    for line in text_of(path).splitlines():
+        range_ = re.match(r"! valid range: (\S+) to (\S+) rad/s", line)
+        if range_ and is_number(range_[1]) and is_number(range_[2]):
+            found = float(range_[1]), float(range_[2])
+        if line.startswith("! shifts (log10 a_T): "):
+            shifts = {float(celsius): float(shift) for celsius, shift
+                      in re.findall(r"(-?[\d.]+(?:e[-+]?\d+)?) C ([-+][\d.]+)", line)}
+    return found, shifts

@@ -19,6 +19,7 @@ from ..base.check import choice, positive
 from ..base.names import counted
 from ..base.tables import text_of
 from .grid_files import esri_grid
+from .height_checks import refuse_other_numbers
 from .map_files import own_map, text_map, text_table, unit_of_dataset
 from .text_repair import repaired_matrix, with_height
 
@@ -343,6 +344,7 @@ def read_map(
     else:
         array = array.T
     _check_heights(path, array, transpose)
+    refuse_other_numbers(path, array)
     return array, lengths, periodic, used, source
 
 

@@ -28,8 +28,8 @@ from ..base.tables import (
     text_of,
 )
 
-__all__ = ["PlainReader", "is_value", "own_map", "row_of_numbers", "text_map", "text_table",
-           "unit_of_dataset"]
+__all__ = ["PlainReader", "is_value", "own_map", "refuse_garbled", "row_of_numbers", "text_map",
+           "text_table", "unit_of_dataset"]
 
 FloatArray = NDArray[np.float64]
 
@@ -216,7 +216,8 @@ def text_table(path: Path) -> tuple[FloatArray, list[str]]:
     ------
     ValueError
         If the file holds no table, or a word that is no number and no mark of a missing value, or
-        lines of different lengths. The message contains the line.
+        lines of different lengths. The message contains the line. A line above the table may be a
+        heading, but not a line of numbers with a typing error.
     """
     rows = decimals(cells_of(text_lines(path)))
     first = next((i for i, (_, cells) in enumerate(rows)
@@ -224,9 +225,40 @@ def text_table(path: Path) -> tuple[FloatArray, list[str]]:
     if first is None:
         raise ValueError(f"{path}: holds no table of numbers")
     body = rows[first:]
+    for line, cells in rows[:first]:
+        refuse_garbled(path, line, cells, len(body[0][1]))
     while all(len(cells) > 1 and cells[-1] == "" for _, cells in body):
         body = [(line, cells[:-1]) for line, cells in body]  # all lines end with a separator
     return _numbers(path, body), rows[first - 1][1] if first else []
+
+
+def refuse_garbled(path: Path, line: int, cells: list[str], width: int) -> None:
+    """Refuse a line above a table that is no heading, but a line of numbers with a typing error.
+
+    Parameters
+    ----------
+    path : Path
+        The file, for messages.
+    line : int
+        Number of the line.
+    cells : list of str
+        Its cells, with decimal points.
+    width : int
+        Number of columns of the table.
+
+    Raises
+    ------
+    ValueError
+        If the line has as many columns as the table, at least half of them are numbers, and another
+        begins like a number; or if three quarters are numbers, and another has a digit. (The first
+        cell may be the name of a row.) The message contains the line and this word.
+    """
+    words = [cell for cell in cells if not is_value(cell)]
+    later = [cell for cell in cells[1:] if not is_value(cell)]
+    if len(cells) == width and (
+            (2 * len(words) <= width and any(re.match(r"[-+]?[.,]?\d", word) for word in words))
+            or (4 * len(words) <= width and any(re.search(r"\d", word) for word in later))):
+        row_of_numbers(path, line, cells, width, line)
 
 
 def _is_a_count(table: FloatArray) -> bool:

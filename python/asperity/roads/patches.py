@@ -172,8 +172,9 @@ def cleaned(one: MeasuredSurface, outliers: str) -> tuple[MeasuredSurface, list[
     if not found.count:
         return one, notes
     if outliers == "report":
-        return one, [*notes, f"{name}: {found.summary()}; `outliers = 'remove'` (--outliers"
-                             " remove) puts the median of the neighbours there"]
+        return one, [*notes, f"{name}: {found.summary()}: if they are errors of the measurement,"
+                             " they may change slopes and friction strongly; `outliers = 'remove'`"
+                             " (--outliers remove) puts the median of the neighbours there"]
     notes.append(f"{name}: {found.summary()}: replaced by the median of the neighbours")
     return MeasuredSurface(found.mended, one.lx, one.ly, one.periodic, one.unit, one.steps,
                            one.source, one.notes), notes

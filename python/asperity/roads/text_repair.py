@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..base.tables import decimals, is_comment, is_number, text_of
-from .map_files import is_value, row_of_numbers
+from .map_files import is_value, refuse_garbled, row_of_numbers
 
 __all__ = ["repaired_matrix", "with_height"]
 
@@ -54,6 +54,7 @@ def repaired_matrix(path: Path, channels: int) -> str | None:
         return None
     lines = text.splitlines()
     first, last, some = _Line(0, []), 0, False
+    above: list[_Line] = []
     unread: list[_Line] = []
     settings: list[int] = []
     for at, line in enumerate(lines):
@@ -62,6 +63,7 @@ def repaired_matrix(path: Path, channels: int) -> str | None:
             continue
         if not first.cells:
             if not (any(map(is_number, cells)) and all(map(is_value, cells))):
+                above.append(_Line(at, cells))
                 continue
             first = _Line(at, cells)
         if _is_read(cells):
@@ -71,6 +73,8 @@ def repaired_matrix(path: Path, channels: int) -> str | None:
         else:
             unread.append(_Line(at, cells))
             last = at
+    for at, cells in above:
+        refuse_garbled(path, at + 1, decimals([(at + 1, cells)])[0][1], len(first.cells))
     if not some:
         return None
     if channels < 2:  # a header between two maps would join them, one behind a map is harmless

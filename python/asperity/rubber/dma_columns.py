@@ -10,13 +10,14 @@ from pathlib import Path
 from ..base.check import choice, shown
 from ..base.tables import Rows, decimals, is_number
 
-__all__ = ["FREQUENCY_UNITS", "KINDS", "MODULUS_UNITS", "ROLES", "TEMPERATURE_UNITS",
-           "asked_columns", "find_columns", "role_of", "split_header"]
+__all__ = ["ABSOLUTE_ZERO", "FREQUENCY_UNITS", "KINDS", "MODULUS_UNITS", "ROLES",
+           "TEMPERATURE_UNITS", "asked_columns", "find_columns", "role_of", "split_header"]
 
 FREQUENCY_UNITS = {"Hz": 2.0 * math.pi, "kHz": 2e3 * math.pi, "mHz": 2e-3 * math.pi,
                    "rad/s": 1.0, "krad/s": 1e3}
 MODULUS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
-TEMPERATURE_UNITS = {"C": 0.0, "K": -273.15}
+ABSOLUTE_ZERO = -273.15  # C
+TEMPERATURE_UNITS = {"C": 0.0, "K": ABSOLUTE_ZERO}
 ROLES = ("frequency", "storage", "loss", "temperature", "tan_delta")
 KINDS = ("shear", "tension")
 
@@ -187,7 +188,7 @@ def find_columns(
     path: Path, header: tuple[int, list[str]], units: list[str],
     given: Mapping[str, str | int],
 ) -> tuple[dict[str, int], dict[str, str | None], str | None]:
-    """Return the index and the unit of each column by role, and 'tension' for tensile moduli."""
+    """Return the index and the unit of each column by role, and the kind of the moduli if named."""
     heads = header[1]
     parts = [_name_and_unit(head) for head in heads]
     places = _places(path, header, parts, units, given)
@@ -210,6 +211,8 @@ def find_columns(
         tensile = name.startswith("tensile") or re.match(r"e('|\d|p|storage)", name)
         if tensile or re.search(r"\bE\s*['′’]", head):
             kind = "tension"
+        elif name.startswith(("shear", "g")) or re.search(r"\bG\s*['′’]", head):
+            kind = "shear"
     return places, found, kind
 
 
@@ -278,4 +281,9 @@ def _asked(path: Path, heads: list[str], parts: list[tuple[str, str | None]],
             raise ValueError(f"columns: {role} = {wanted!r}: {path} has the columns"
                              f" {', '.join(map(repr, heads)) or 'without names'}")
         places[role] = match[0]
+    for role, at in places.items():
+        twin = next((other for other in places if other != role and places[other] == at), None)
+        if twin is not None:
+            raise ValueError(f"columns: {role} and {twin} are the same column, {given[role]!r}:"
+                             " each needs its own")
     return places

@@ -171,9 +171,7 @@ class DmaFit:
         OSError
             If the file cannot be written.
         """
-        if len(self.shifts) < 2:
-            raise ValueError(f"{self.name}: has no sweeps at several temperatures: there are no"
-                             " shifts to write")
+        self.check_sweeps()
         path = Path(path)
         check_shifts(path)
         upward = dict(self.vertical_shifts)
@@ -182,6 +180,12 @@ class DmaFit:
                   for t, shift in self.shifts]
         write_text(path, "\n".join(lines) + "\n", "ascii")
         return path
+
+    def check_sweeps(self) -> None:
+        """Raise ValueError if the data have a single temperature, and hence no shifts."""
+        if len(self.shifts) < 2:
+            raise ValueError(f"{self.name}: has no sweeps at several temperatures: there are no"
+                             " shifts to write")
 
     def plot(self) -> Figure:
         """Draw the data and the fit, tan delta, and the errors of the fit.

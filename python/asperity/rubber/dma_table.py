@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..base.check import choice, poisson_ratio
 from ..base.tables import Rows, cells_of, text_lines
 from .dma_columns import (
+    ABSOLUTE_ZERO,
     FREQUENCY_UNITS,
     KINDS,
     MODULUS_UNITS,
@@ -154,21 +155,50 @@ def read_dma(
     values = _numbers(path, body, places)
     storage = to_pascal * values["storage"]
     if "loss" in places:
-        to_loss = to_pascal
-        if modulus_unit is None and found_units.get("loss") is not None:
-            to_loss = unit("loss", None, MODULUS_UNITS, "Pa")
-        loss = to_loss * values["loss"]
+        own = modulus_unit is None and found_units.get("loss") is not None
+        loss = values["loss"] * (unit("loss", None, MODULUS_UNITS, "Pa") if own else to_pascal)
     else:
         percent = found_units.get("tan_delta") == "%"
         loss = storage * values["tan_delta"] * (0.01 if percent else 1.0)
-    if kind == "tension" or (kind is None and found_kind == "tension"):
-        factor = 0.5 / (1.0 + poisson)
-        storage, loss = factor * storage, factor * loss
-        notes.append(f"moduli in tension: G = E/(2 (1 + poisson)) = {factor:.6g} E")
-    temperature = values["temperature"] + to_celsius if "temperature" in places else None
-    if temperature is None:
+    factor, said = _to_shear(kind, found_kind, poisson)
+    storage, loss = factor * storage, factor * loss
+    notes += said
+    temperature = None
+    if "temperature" in places:
+        temperature = values["temperature"] + to_celsius
+        _check_temperatures(path, body, temperature)
+    else:
         notes += _repeated(values["frequency"], storage)
     return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
+
+
+def _to_shear(kind: str | None, named: str | None, poisson: float) -> tuple[float, list[str]]:
+    """Return the shear modulus over a modulus of the table, and a note on its kind.
+
+    Parameters
+    ----------
+    kind : str or None
+        What the caller says.
+    named : str or None
+        What the header says.
+    poisson : float
+        Poisson ratio.
+    """
+    if (kind or named) == "tension":
+        factor = 0.5 / (1.0 + poisson)
+        return factor, [f"moduli in tension: G = E/(2 (1 + poisson)) = {factor:.6g} E"]
+    return 1.0, [] if kind or named else [
+        "the header does not say whether the moduli are of shear or of tension: taken as shear;"
+        " for tension, where G = E/(2 (1 + poisson)), give kind = 'tension' (--kind tension)"]
+
+
+def _check_temperatures(path: Path, body: Rows, temperature: FloatArray) -> None:
+    """Refuse temperatures that do not exist, because the unit of their column is wrong."""
+    at = int(np.argmin(temperature))
+    if temperature[at] < ABSOLUTE_ZERO:
+        raise ValueError(f"{path}: line {body[at][0]}: temperature = {temperature[at]:g} C: must"
+                         f" be >= {ABSOLUTE_ZERO:g} C; look at the unit of the column"
+                         " (temperature_unit, --temperature-unit)")
 
 
 def _repeated(frequency: FloatArray, storage: FloatArray) -> list[str]:
