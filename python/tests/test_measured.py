@@ -312,6 +312,18 @@ def test_coordinates_beside_a_matrix_are_no_heights(tmp_path, corner, separator)
         load(path, unit="mm", size=(1.5, 2.0))
 
 
+def test_outliers_are_noted(tmp_path):
+    """Only `friction` used to tell them."""
+    heights = np.add.outer(np.sin(np.arange(40.0)), np.cos(0.3 * np.arange(50.0)))
+    np.savetxt(tmp_path / "map.txt", heights)
+    assert not any("far off" in note
+                   for note in load(tmp_path / "map.txt", unit="um", size=(2, 1)).notes)
+    heights[20, 30] = 60.0
+    np.savetxt(tmp_path / "map.txt", heights)
+    notes = load(tmp_path / "map.txt", unit="um", size=(2, 1)).notes
+    assert any(note.startswith("1 of 2000 cells lie far off their neighbours") for note in notes)
+
+
 def test_marks_of_missing_points_are_no_heights(tmp_path):
     heights = sample()
     heights[1, 2] = heights[3, 3] = -9999.0

@@ -21,6 +21,7 @@ from ..base.presenters import present
 from .instrument_files import UNITS, channels, read_map, to_metres
 from .map_work import MapWork, fit_terms, polynomial
 from .map_writer import new_map_file, write_grid, write_height
+from .outliers import find_outliers
 from .statistics import statistics
 
 __all__ = ["MeasuredSurface", "channels", "import_topography", "load"]
@@ -33,6 +34,7 @@ _AS_IS = "as-is"        # of `periodic`: opposite edges match already
 
 # Opposite edges fit if the mean square of their steps is at most this multiple of that inside.
 _SIMILAR = 4.0
+_MOST_CHECKED, _LEAST_ROWS = 500_000, 5  # cells, and rows of them, in which outliers are sought
 _STEEP = 3.0            # rms slope above which a unit is likely to be wrong
 
 
@@ -287,7 +289,8 @@ def load(
     # Lengths that a file sums over cells contain rounding errors: twelve digits are significant.
     lx, ly = (float(f"{to_metres(length, unit):.12g}") for length in work.sizes)
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
-                           [*_jump_note(jump, level, unit, work.periodic), *_advice(work, level)])
+                           [*_jump_note(jump, level, unit, work.periodic), *_advice(work, level),
+                            *_outlier_note(height)])
 
 
 def _check_window(periodic: str | None, taper: float | None, restore_rms: bool) -> None:
@@ -391,6 +394,17 @@ def _advice(work: MapWork, level: str) -> list[str]:
     elif any(step["step"] == "periodic" for step in work.steps) and not _edges_fit(work.height):
         notes.append("the map is declared periodic, but opposite edges do not fit")
     return notes
+
+
+def _outlier_note(height: FloatArray) -> list[str]:
+    """Return a note on outliers in the first rows of a map, m, or in a profile."""
+    rows = max(_LEAST_ROWS, _MOST_CHECKED // height.shape[1])
+    found = find_outliers(height[:rows])
+    if not found.count:
+        return []
+    where = f"in the first {rows} rows " if rows < height.shape[0] else ""
+    return [f"{where}{found.summary()}: if they are errors of the measurement, the slopes are too"
+            " large; `asperity friction --outliers remove` leaves them out"]
 
 
 def _edge_note(height: FloatArray) -> str:
