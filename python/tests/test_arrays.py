@@ -192,3 +192,10 @@ def test_maps_of_one_column_are_refused(tmp_path):
                 lambda: asperity.Case(surface=np.ones((3, 1)))):
         with pytest.raises(ValueError, match=r"has shape \(3, 1\), \(ny, nx\): nx must be at lea"):
             use()
+
+
+def test_a_surface_made_of_an_array_can_be_saved_and_shown(tmp_path):
+    """Its origin is unknown, which used to end with a KeyError."""
+    made = asperity.surface.MeasuredSurface(wave(), 1e-3, 1e-3, True, "um")
+    assert "an array" in made.summary()
+    assert asperity.surface.load(made.save(tmp_path / "map.h5"), level="none").lx == 1e-3

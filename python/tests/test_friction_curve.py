@@ -105,6 +105,21 @@ def test_a_fitted_namelist_keeps_the_measured_range(tmp_path):
                    pressures=[2e5], temperatures=[-300.0])
 
 
+@pytest.mark.parametrize(("source", "option"), [
+    (COMPOUND, {"wlf": (8.0, 120.0, 20.0)}), (COMPOUND, {"vertical": True}),
+    (RUBBER, {"columns": {"loss": 2}}), (RUBBER, {"arms_per_decade": 2.0}),
+    (RUBBER, {"kind": "tension"})])
+def test_options_that_a_rubber_does_not_use_are_refused(source, option):
+    """They used to be ignored unless the rubber was a namelist."""
+    with pytest.raises(ValueError, match=rf"{next(iter(option))} \(--[a-z-]+\): is for DMA tables"):
+        compound_of(source, **option)
+
+
+def test_rubbers_with_a_negative_poisson_ratio(tmp_path):
+    (tmp_path / "foam.nml").write_text("&material shear_modulus = 1e6, poisson = -0.2 /")
+    assert compound_of(tmp_path / "foam.nml").poisson == -0.2
+
+
 # ---- statistics ------------------------------------------------------------------------------
 
 
@@ -965,7 +980,7 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--speeds", "-1,2"], "speeds[0] = -1.0"),
     ([ROAD, "--material", "r.nml", "--temperatures", "-99"], "temperature = -99: a_T = inf by"),
     ([ROAD, "--material", "r.nml", "--seed", "-3"], "seed = -3: must be an integer >= 0"),
-    ([ROAD, "--material", "r.nml", "--wlf", "8", "120"], "wlf: is for DMA tables only"),
+    ([ROAD, "--material", "r.nml", "--wlf", "8", "120"], "wlf (--wlf): is for DMA tables only"),
     ([ROAD, "--material", "r.nml", "--temperature-tolerance", "1"], "is for DMA tables only"),
     ([ROAD, "--material", "r.nml", "--column", "storage=2"], "--column): is for DMA tables"),
     ([ROAD, "--material", "r.nml", "--unit", "um"], "unit: only for roads that are files"),

@@ -242,3 +242,10 @@ def test_plot_shows_units_and_legend():
 def test_wrong_values_are_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_moduli_at_extreme_frequencies_are_numbers():
+    """The square of omega tau used to overflow."""
+    rubber = Prony(1.0, [2.0], [1e180])
+    np.testing.assert_allclose(rubber.complex_modulus([1e-190, 1e-180, 1e-3, 1e100]),
+                               [1.0 + 2e-10j, 2.0 + 1.0j, 3.0, 3.0], rtol=1e-9)

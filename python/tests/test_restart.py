@@ -18,6 +18,7 @@ import viscoelastic_case as vc
 from conftest import PATIENCE
 
 import asperity
+from asperity.results.standing import way_on
 
 
 @pytest.fixture(scope="module")
@@ -357,3 +358,30 @@ def test_friction_adhesion_and_inertia(program: str, tmp_path: Path) -> None:
     balance = h["work_normal"] + h["work_tangential"] - kept - lost
     # To round-off, or to the tangential solver's tolerance if its last return map has an effect.
     assert abs(balance).max() < 1e-6 * abs(kept).max()
+
+
+SHORT = """
+    &grid nx = 16, ny = 16, lx = 1e-3 /
+    &surface shape = 'sine', wavelength = 1e-3, amplitude = 1e-5 /
+    &material shear_modulus = 1e6, prony_g = 1e6, prony_tau = 0.1 /
+    &phase pressure = 1e4, duration = 0.3, steps = 3 /
+    """
+
+
+def test_a_snapshot_is_not_written_again(tmp_path: Path) -> None:
+    """The time of the first row is 0.1 s within round-off, but smaller."""
+    case = tmp_path / "case.nml"
+    case.write_text(SHORT + "&output snapshot_times = 0.1 /")
+    assert [each.step for each in asperity.run(case).snapshots] == [1, 3]
+    parts = asperity.run(case, callback=lambda row, sim: row.step < 1, overwrite=True)
+    assert not parts.finished and [each.step for each in parts.snapshots] == [1]
+    assert [each.step for each in asperity.run(case, restart=True).snapshots] == [1, 3]
+
+
+@pytest.mark.parametrize("name", ["run.v2", "run", "run.h5"])
+def test_the_checkpoint_of_any_name_is_found(tmp_path: Path, name: str) -> None:
+    """Python used to look for run.checkpoint.h5 only, and said that there is no checkpoint."""
+    case = tmp_path / "case.nml"
+    case.write_text(SHORT + f"&output file = '{name}' /")
+    run = asperity.run(case, callback=lambda row, sim: row.step < 1)
+    assert way_on(run) == "--restart continues from the last checkpoint"

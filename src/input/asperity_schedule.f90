@@ -72,7 +72,7 @@ contains
       end do
    end function count_rows
 
-   !> Remember the load, the velocity and the pull with which a phase ends.
+   !> Remember the load and the pull with which a phase ends.
    pure subroutine hold(self, phase)
       type(schedule_type), intent(inout) :: self
       type(phase_settings_type), intent(in) :: phase

@@ -8,8 +8,9 @@ module case_identity
 contains
 
    !> The settings of a case as lines 'group: name = value', without those that do not affect the numbers:
-   !> the title, the output, and the threads. The names of files with height maps do not matter either, because they
-   !> depend on the folder in which a run is started; the caller compares the checksums of the maps.
+   !> the title, the output, and the threads. (The names of phases count, because the result shows them.) The names of files
+   !> with height maps do not matter either, because they depend on the folder in which a run is started; the caller compares
+   !> the checksums of the maps.
    function identity_of(settings) result(lines)
       character(*), intent(in) :: settings       !! of `resolved_input`
       character(:), allocatable :: lines

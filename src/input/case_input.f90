@@ -258,7 +258,7 @@ contains
       known = nx > 1 .and. ny > 0 .and. lx > 0.0_dp .and. .not. group%bad('ly')
       if (.not. known) return
       if (real(nx, dp)*real(ny, dp) > real(huge(1), dp)) then
-         call group%fault('nx', 'nx times ny = '//to_text(ny)//' must be at most '//to_text(huge(1)), faults)
+         call group%fault('nx', 'with ny = '//to_text(ny)//': nx times ny must be at most '//to_text(huge(1)), faults)
          known = .false.
          return
       end if

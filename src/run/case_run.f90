@@ -104,7 +104,7 @@ contains
       self%finished = self%sim%finished
       associate (times => self%sim%case%output%snapshot_times)
          do while (self%next_time <= size(times))
-            if (times(self%next_time) > self%sim%state%row%time) exit
+            if (times(self%next_time) > reached_time(self)) exit
             self%next_time = self%next_time + 1
          end do
       end associate
@@ -144,6 +144,14 @@ contains
          '; the history ends with this step, and all steps before it have converged')
    end subroutine end_unconverged
 
+   !> The latest time that counts as reached by the last row: within round-off, s.
+   pure function reached_time(self) result(time)
+      type(run_type), intent(in) :: self
+      real(dp) :: time
+
+      time = self%sim%state%row%time*(1.0_dp + 1e-12_dp)
+   end function reached_time
+
    !> Is a snapshot of the last row due?
    function snapshot_due(self) result(due)
       type(run_type), intent(inout) :: self
@@ -154,8 +162,7 @@ contains
          due = self%finished .or. .not. self%sim%converged
          if (output%snapshot_every > 0) &
             due = due .or. mod(self%sim%state%row%step, output%snapshot_every) == 0
-         ! A time counts as reached within round-off.
-         now = self%sim%state%row%time*(1.0_dp + 1e-12_dp)
+         now = reached_time(self)
          do while (self%next_time <= size(output%snapshot_times))
             if (output%snapshot_times(self%next_time) > now) exit
             due = .true.

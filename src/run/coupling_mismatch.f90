@@ -7,9 +7,9 @@
 !> lengths by which the road at U_T overlaps the surface or leaves it, divided by the number of cells with pressure and
 !> by the rms height. A cell that the road leaves counts at most with the length by which its own pressure compresses
 !> it, since it then opens. (After a step that was solved for all unknowns at once, a cell may touch without pressure and
-!> carry traction. It counts with the whole difference of the heights.) With constant shear a cell with hardly any pressure carries as much traction as any other,
-!> and none of these shows whether it obeys the law. In that case the sum of the errors of all cells (module
-!> `edge_shares`) counts as well.
+!> carry traction. It counts with the whole difference of the heights.) With constant shear a cell with hardly any pressure
+!> carries as much traction as any other, and none of these shows whether it obeys the law. In that case the sum of the
+!> errors of all cells (module `edge_shares`) counts as well.
 !>
 !> Outside the contact U_T may differ much from the place at which the road was read, because nothing there depends on
 !> it. Cells without pressure therefore get the road at U_T, and their gap over it. U_z and the solves are not changed.

@@ -14,9 +14,8 @@
 !> step, because that of the start is not kept. A cell that enters or leaves the contact has no bound at one end. On a
 !> steep slope b may be infinite; b is therefore at most max(t, 2 t').
 !>
-!> All of this is continuous in the tractions and the slip. Whether a cell was marked as sticking or slipping does not
-!> count, because this is round-off where the traction lies on its bound and the slip vanishes, for example when the
-!> road has stopped.
+!> All of this is continuous in the tractions and the slip. The slip of a cell that sticks is an error of the solver, and
+!> its loss is not counted.
 module friction_books
    use asperity_precision, only : dp
    use contact_rule, only : touches

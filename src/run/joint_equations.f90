@@ -146,10 +146,10 @@ contains
       integer :: status(2)
 
       status = 0
-      if (.not. allocated(self%place)) then
+      if (.not. allocated(self%place)) &
          allocate (self%place(self%grid%nx, 2, self%grid%rows()), source=0.0_dp, stat=status(1))
-         allocate (self%origin, source=self%place, stat=status(2))
-      end if
+      if (.not. allocated(self%origin)) &
+         allocate (self%origin(self%grid%nx, 2, self%grid%rows()), source=0.0_dp, stat=status(2))
       done = .not. any_process(any(status /= 0))
       if (.not. done) return
       self%origin(:, :, :) = origin(:, :2, :)

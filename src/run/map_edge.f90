@@ -50,8 +50,8 @@ contains
          if (least >= near) return
          state%edge = edge_near
          call add_line(message, 'points enter or leave the free map only '//to_text(least)// &
-            ' m below the rubber, which is displaced by '//to_text(depth)//' m under the load: if it is less than '// &
-            to_text(near)//' m, use a larger map')
+            ' m below the rubber: at least '//to_text(near)//' m are needed, because the load displaces the rubber by '// &
+            to_text(depth)//' m; use a larger map')
       end if
    end subroutine check_edge
 

@@ -125,11 +125,30 @@ contains
          text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//in_one_line(boundary, 40)
       end if
       text = text//nl//'heights     '//to_text(minval(height))//' m to '//to_text(maxval(height))// &
-         ' m, rms '//to_text(sqrt(sum((height - sum(height)/size(height))**2)/size(height)))//' m'//nl
+         ' m, rms '//to_text(rms_of(height))//' m'//nl
       text = text//attribute_line(file, 'steps_text', 'processing  ', 400)
       call file%report(error)
       text = text//'to use it   &surface shape = ''file'', file = '//in_quotes(path)//' /'//nl
    end subroutine describe_map
+
+   !> The rms height of a map about its mean, by columns, because a copy of the map may not fit into the memory.
+   pure function rms_of(height) result(rms)
+      real(dp), intent(in) :: height(:, :)           !! m
+      real(dp) :: rms                                !! m
+      real(dp) :: cells, mean, squares
+      integer :: j
+
+      cells = real(size(height, 1), dp)*real(size(height, 2), dp)
+      mean = 0.0_dp
+      do j = 1, size(height, 2)
+         mean = mean + sum(height(:, j))/cells
+      end do
+      squares = 0.0_dp
+      do j = 1, size(height, 2)
+         squares = squares + sum((height(:, j) - mean)**2)
+      end do
+      rms = sqrt(squares/cells)
+   end function rms_of
 
    !> The line for an attribute of the file, whose own lines are separated by semicolons; '' if there is no such
    !> attribute, or if it is empty.

@@ -228,14 +228,16 @@ contains
       type(steady_step_type), intent(inout) :: self
       type(steady_state_type), intent(in) :: state
       type(normal_problem_type), intent(inout) :: problem
-      real(dp) :: part, scale
+      real(dp) :: part, scale, gaps
       integer :: j
 
       problem%warm = state%last%known
       if (.not. problem%warm) return
       part = extrapolation(state, self%medium%velocity, problem%target)
       associate (c => self%contact, a => state%last, b => state%before)
-         scale = field_sum(a%pressure)/max(field_sum(a%gap), field_sum(b%gap), tiny(1.0_dp))
+         gaps = max(field_sum(a%gap), field_sum(b%gap))
+         scale = 1.0_dp                                ! without any gap it does not count
+         if (gaps > 0.0_dp) scale = field_sum(a%pressure)/gaps
          do j = 1, self%grid%rows()
             ! Pressure and gap are extrapolated as one quantity: the pressure if positive, the scaled gap if negative.
             c%pressure(:, j) = a%pressure(:, j) - scale*a%gap(:, j)

@@ -27,7 +27,6 @@ module friction_rows
 
    real(dp), parameter :: unbounded = huge(1.0_dp)
 
-   integer, parameter, public :: site_columns = 5    !! P, H_x, H_y, F, N_z
 
    !> Sums of `returned_row`.
    type :: move_sums_type

@@ -1,7 +1,8 @@
-!> Follows a path of solutions from a contact without friction to the one that is sought (pseudo-arclength continuation).
+!> Follows a path of solutions from one that is known to the one that is sought (pseudo-arclength continuation).
 !>
-!> On the path a part of the tangential displacement counts, from 0 to 1. At part 0 the pressure is that of the contact
-!> without friction and all cells slide along the motion of the road, which is known. On steep roads the path often turns
+!> On the path the road is read between an origin (part 0) and the displacement that the tractions cause (part 1). For a
+!> step the origin is the place of the last pass, whose result solves the equations at part 0; in steady sliding it is the
+!> undeformed surface (module `steady_joint`). On steep roads the path often turns
 !> back before it reaches 1, because contacts snap to other places: there are several solutions for some parts, and none
 !> nearby for a larger part. The part is therefore an unknown (module `joint_plane`), and steps are measured along the path.
 !> Each solution is predicted by the tangent at the last one. A step is halved if Newton's method does not succeed.
@@ -23,14 +24,14 @@ module joint_path
    integer, parameter :: steps_to_halve = 3            !! of Newton's method, in which the residual must be halved
    integer, parameter :: few_steps = 3                 !! of Newton's method, after which the next step may be longer
    real(dp), parameter :: rough = 1.0e-2_dp            !! tolerance of the solutions along the path
-   real(dp), parameter :: first_part = 0.25_dp         !! of the tangential displacement
+   real(dp), parameter :: first_part = 0.25_dp         !! of the way from the origin
    real(dp), parameter :: growth = 1.5_dp              !! of a step that succeeded
    real(dp), parameter :: shortest = 1.0e-4_dp         !! step
    real(dp), parameter :: leaps(4) = [0.1_dp, 0.03_dp, 0.3_dp, 0.01_dp]   !! changes of the part, in the order of trial
 
 contains
 
-   !> Follow the path from the contact without friction in `newton%now`. If this succeeds, the solution is there.
+   !> Follow the path from the solution at part 0 in `newton%now`. If this succeeds, the solution is there.
    subroutine follow_path(newton, system, tolerance, solved)
       class(joint_newton_type), intent(inout) :: newton
       class(joint_system_type), intent(inout) :: system

@@ -37,7 +37,7 @@ module joint_system
       real(dp), allocatable :: s(:, :)                 !! m [nx, rows]
       real(dp), allocatable :: t(:, :, :)              !! Pa [nx, 2, rows]
       real(dp) :: level = 0.0_dp                       !! m
-      real(dp) :: part = 1.0_dp                        !! of the tangential displacement that counts (on a path)
+      real(dp) :: part = 1.0_dp                        !! of the way to the place of the road (on a path)
       real(dp), allocatable :: residual(:, :, :)       !! of the equations of a cell, scaled [nx, 3, rows]
       real(dp) :: load_residual = 0.0_dp               !! of the load, scaled, times `root`
       real(dp) :: path_residual = 0.0_dp               !! of the plane across a path, scaled, times `root`

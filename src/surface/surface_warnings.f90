@@ -95,7 +95,7 @@ contains
       ly = length_of(file, map, 'ly')
       if (grid%ny == 1) ly = 0.0_dp
       if (differs(lx, grid%lx) .or. differs(ly, grid%ly)) then
-         text = start//'according to the file the map is '//rounded_text(lx, 5)//' m by '// &
+         text = start//'according to the file the map is '//rounded_text(merge(lx, grid%lx, lx > 0.0_dp), 5)//' m by '// &
             rounded_text(merge(ly, grid%ly, ly > 0.0_dp), 5)//' m, but the grid is '//rounded_text(grid%lx, 5)// &
             ' m by '//rounded_text(grid%ly, 5)//' m: this changes its slopes'
          call append(warnings, text)

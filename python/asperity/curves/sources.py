@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.check import positive, shown
+from ..base.check import poisson_ratio, shown
 from ..base.tables import is_number, text_lines, text_of
 from ..roads.measured import MeasuredSurface, load
 from ..roads.patches import DrawnRoad, MeasuredRoad, cleaned
@@ -294,9 +294,16 @@ def compound_of(
     OSError, ValueError
         If the file cannot be read, or does not describe a rubber.
     """
+    shift = {"wlf": wlf, "reference": reference}
+    of_table = {"vertical": vertical or None,
+                "arms_per_decade": None if arms_per_decade == 1.0 else arms_per_decade,
+                "temperature_tolerance": temperature_tolerance, "columns": columns or None,
+                **reading}
     if isinstance(source, Compound):
+        _refuse(shift | of_table, "the material is a Compound, which is complete")
         return source
     if isinstance(source, Prony):
+        _refuse(of_table, "the material is a Prony series")
         constants = wlf_constants(wlf, reference)
         usual = reference if constants is None else constants.t_ref
         return Compound(source, None if usual is None else float(usual), constants)
@@ -307,15 +314,8 @@ def compound_of(
     lines = text_lines(path)
     words = next((line.strip() for _, line in lines if not line.strip().startswith("!")), "")
     if words.startswith(("&", "$")):
-        for name, value in (("wlf", wlf), ("reference", reference), ("vertical", vertical or None),
-                            ("temperature_tolerance (--temperature-tolerance)",
-                             temperature_tolerance),
-                            ("columns (--column)", columns or None),
-                            *((f"{name} (--{name.replace('_', '-')})", value)
-                              for name, value in reading.items())):
-            if value is not None:
-                raise ValueError(f"{name}: is for DMA tables only: {path} is a namelist, which has"
-                                 " its own wlf_c1, wlf_c2 and reference_temperature")
+        _refuse(shift | of_table, f"{path} is a namelist, which has its own wlf_c1, wlf_c2 and"
+                " reference_temperature")
         return _of_namelist(path)
     table = read_dma(path, columns=columns, **reading)
     fit = fit_dma(table, wlf=wlf, reference=reference, vertical=vertical,
@@ -324,6 +324,14 @@ def compound_of(
                       else {"temperature_tolerance": temperature_tolerance}))
     return Compound(fit.material, fit.reference, fit.wlf, dict(fit.shifts),
                     dict(fit.vertical_shifts), fit.valid_range, fit.name, list(fit.notes))
+
+
+def _refuse(options: Mapping[str, Any], reason: str) -> None:
+    """Refuse options of DMA tables that were given for another source of a rubber."""
+    for name, value in options.items():
+        if value is not None:
+            option = "column" if name == "columns" else name.replace("_", "-")
+            raise ValueError(f"{name} (--{option}): is for DMA tables only: {reason}")
 
 
 def _of_namelist(path: Path) -> Compound:
@@ -346,7 +354,7 @@ def _of_namelist(path: Path) -> Compound:
     if group.wlf_c1 and group.wlf_c2:
         wlf = WLF(float(group.wlf_c1), float(group.wlf_c2), reference)
     given = reference if group.temperature is None else float(group.temperature)
-    poisson = positive("poisson", group.poisson) if group.poisson else 0.0
+    poisson = poisson_ratio(float(group.poisson or 0.0))
     valid_range, shifts = _of_comments(path)
     return Compound(series, reference, wlf, shifts if wlf else {}, valid_range=valid_range,
                     name=path.name, poisson=poisson, usual=given)

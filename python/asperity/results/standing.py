@@ -59,6 +59,11 @@ def time_of_row(run: ResultFile) -> float | None:
     return float(last.max()) if len(last) else None
 
 
+def _beside(path: Path, ending: str) -> Path:
+    """Return the name of a file that a run keeps beside its result: only a last .h5 is replaced."""
+    return path.with_suffix(ending) if path.suffix == ".h5" else Path(f"{path}{ending}")
+
+
 def held(run: ResultFile) -> bool | None:
     """Return whether a process holds the lock of a result; None if this cannot be determined.
 
@@ -66,7 +71,7 @@ def held(run: ResultFile) -> bool | None:
     all locks is read instead.
     """
     path = Path(os.path.realpath(run.path))
-    lock = path.with_suffix(".lock") if path.suffix == ".h5" else Path(f"{path}.lock")
+    lock = _beside(path, ".lock")
     try:
         words = lock.read_text(errors="replace").split()
         if words[3:5] != ["on", platform.node()]:  # asperity process NUMBER on HOST since ...
@@ -115,6 +120,6 @@ def standing(run: ResultFile) -> str:
 
 def way_on(run: ResultFile) -> str:
     """Return how a run that ended too early is continued. Without a checkpoint it cannot be."""
-    if run.path.with_suffix(".checkpoint.h5").exists():
+    if _beside(run.path, ".checkpoint.h5").exists():
         return "--restart continues from the last checkpoint"
     return "there is no checkpoint: --overwrite starts again"

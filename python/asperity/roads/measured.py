@@ -112,8 +112,9 @@ class MeasuredSurface:
             return f"{value:.6g} m ({value / scale:.6g} {self.unit})"
 
         lines = [
-            f"source      {self.source['name']} ({self.source['format']}), channel"
-            f" {self.source['channel']!r}, in {self.unit}",
+            f"source      {self.source.get('name', 'an array')}"
+            f" ({self.source.get('format', 'no file')}), channel"
+            f" {self.source.get('channel', 'Default')!r}, in {self.unit}",
             *(f"step        {step_in_words(step)}" for step in self.steps),
             f"nx, ny      {nx}, {ny}",
             f"lx          {both(self.lx)}",
@@ -152,12 +153,12 @@ class MeasuredSurface:
         import h5py
 
         path = Path(path)
-        with new_map_file(path, self.source["name"], "asperity import",
+        with new_map_file(path, self.source.get("name", "an array"), "asperity import",
                           self.height.nbytes) as file:
             file.attrs.update({f"source_{name}": value for name, value in self.source.items()
                                if name != "metadata"})
             # The metadata are a dataset, because an attribute is limited to 64 kB.
-            text = json.dumps(self.source["metadata"], default=str)
+            text = json.dumps(self.source.get("metadata", {}), default=str)
             metadata = file.create_dataset("source/metadata", data=text,
                                            dtype=h5py.string_dtype())
             metadata.attrs.update(units="1", long_name="what the file says of the measurement"

@@ -233,8 +233,8 @@ def fit_dma(
         Number of relaxation times per decade.
     reference : float, optional
         Reference temperature, C. With `wlf` it can be any temperature, by default that of the
-        constants. Without `wlf` it is the nearest temperature of the table, by default the middle
-        one.
+        constants. Without `wlf` it is a temperature of the table, within the tolerance, by default
+        the middle one.
     wlf : (c1, c2) or (c1, c2, t_ref), optional
         Constants of the shift: dimensionless, K, C. `t_ref` is `reference` by default. Without
         them, several temperatures are shifted by `asperity.material.master_curve`.
@@ -304,7 +304,7 @@ def fit_dma(
         largest_error=float(max(np.abs(errors[0]).max(), np.abs(errors[1]).max())),
         plateau_bounded=bounded, name=table.name, notes=notes,
         vertical_shifts=([(t, float(found.log_vertical[rows[0]])) for t, rows in sweeps]
-                         if vertical else []))
+                         if vertical and constants is None else []))
 
 
 def _fit_notes(points: int, arms: int, rms: float, held_at: float | None) -> list[str]:

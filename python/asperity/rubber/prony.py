@@ -161,10 +161,12 @@ class Prony:
         (2+1j)
         """
         x = array_of("omega", omega)[..., None] * self._tau
-        scale = 1.0 / (1.0 + x * x)
-        storage = self._g_inf + np.sum(self._g * x * x * scale, axis=-1)
-        loss = np.sum(self._g * x * scale, axis=-1)
-        return storage + 1j * loss
+        # The smaller of x and 1/x, whose square cannot overflow.
+        small = np.divide(1.0, x, out=x.copy(), where=np.abs(x) > 1.0)
+        scale = 1.0 / (1.0 + small * small)
+        storage = self._g_inf + np.sum(
+            self._g * np.where(np.abs(x) > 1.0, scale, small * small * scale), axis=-1)
+        return storage + 1j * np.sum(self._g * small * scale, axis=-1)
 
     def storage_modulus(self, omega: ArrayLike) -> FloatArray:
         """Return G'(omega), Pa.

@@ -17,7 +17,13 @@ from PIL.Image import Dither, Image, Quantize
 from ..base.files import PICTURE, check_output, new_file
 from ..results.settings import has_friction
 from ..results.steady import steady_speeds
-from .colour_scales import field_style, mark_scale, state_style, without_open_cells
+from .colour_scales import (
+    field_style,
+    mark_scale,
+    state_style,
+    without_open_cells,
+    without_round_off,
+)
 from .plot_fields import frame_of, stretch_of, write_lengths
 from .plot_history import horizontal, steady_words
 from .style import (
@@ -150,7 +156,8 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     else:
         sample = _sample(snapshots, field)
         factor, scale_unit, style = field_style(sample, field, snapshots[0].units(field))
-        image = panel.imshow(without_open_cells(snapshots[0][field] * factor, field),
+        image = panel.imshow(without_open_cells(without_round_off(snapshots[0], field) * factor,
+                                                field),
                              origin="lower", extent=edges, aspect=stretch, **style)
         tall = float(np.clip(grid.ly / grid.lx, 0.1, 2.5))  # the bar is as tall as the map
         bar = figure.colorbar(image, ax=panel, fraction=0.046 * tall, pad=0.03)
@@ -168,7 +175,7 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
 
     def draw(number: int) -> Any:
         snapshot = snapshots[number]
-        values = snapshot[field]
+        values = without_round_off(snapshot, field)
         image.set_data(values if field == "contact"
                        else without_open_cells(values * factor, field))
         row = int(np.searchsorted(run.history["step"], snapshot.step))
@@ -207,7 +214,8 @@ def _sample(snapshots: list[Snapshot], field: str) -> NDArray[Any]:
     They are the quantiles of each snapshot, which include its extremes.
     """
     shares = np.linspace(0.0, 1.0, 1001)
-    return np.array([np.quantile(snapshot[field], shares) for snapshot in snapshots])
+    return np.array([np.quantile(without_round_off(snapshot, field), shares)
+                     for snapshot in snapshots])
 
 
 def _moment(snapshot: Snapshot, last: Snapshot) -> str:

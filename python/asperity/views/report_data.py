@@ -74,7 +74,7 @@ def kept_rows(run: Run) -> NDArray[np.intp]:
 
     Up to `MOST_ROWS` these are all rows. A longer history is divided into intervals, and the rows
     with the smallest and the largest friction and contact area of each interval are kept, so that
-    no peak is lost. The first and the last row, and those of snapshots, are also kept.
+    no peak is lost. The first and the last row are also kept.
     """
     rows = run.history.rows
     if rows <= MOST_ROWS:
