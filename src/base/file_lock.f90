@@ -90,12 +90,7 @@ contains
          end if
          if (c_flock(int(fnum(self%unit), c_int), exclusive_at_once) /= 0) then
             if (any(ierrno() == would_block)) then
-               holder = first_line(self%unit)
-               if (holder == '') then
-                  holder = 'another process'
-               else
-                  holder = holder(len('asperity ') + 1:)
-               end if
+               holder = holder_in(self%unit)
                close (self%unit)
                self%unit = 0
                call fail(error, error_file, protected//': is in use by '//holder// &
@@ -118,6 +113,19 @@ contains
       call hostnm(host)
       call write_line(self%unit, mark//to_text(int(c_getpid()))//' on '//trim(host)//' since '//utc_time())
    end subroutine acquire
+
+   !> The process that holds a lock, by what it has written into the file.
+   function holder_in(unit) result(holder)
+      integer, intent(in) :: unit
+      character(:), allocatable :: holder
+
+      holder = first_line(unit)
+      if (holder == '') then
+         holder = 'another process'
+      else
+         holder = holder(len('asperity ') + 1:)
+      end if
+   end function holder_in
 
    !> The state of a lock. An attempt to take it could prevent a run from starting at that moment. Linux's list of all
    !> locks is read instead.

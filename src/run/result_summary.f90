@@ -131,7 +131,8 @@ contains
       text = text//'to use it   &surface shape = ''file'', file = '//in_quotes(path)//' /'//nl
    end subroutine describe_map
 
-   !> The rms height of a map about its mean, by columns, because a copy of the map may not fit into the memory.
+   !> The rms height of a map about its mean, by columns, because a copy of the map may not fit into the memory. A single
+   !> process reads the file, and all would have to call the sums of module `field_sums`.
    pure function rms_of(height) result(rms)
       real(dp), intent(in) :: height(:, :)           !! m
       real(dp) :: rms                                !! m

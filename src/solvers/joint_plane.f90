@@ -1,9 +1,9 @@
 !> A plane across a path of solutions (pseudo-arclength continuation).
 !>
-!> On a path the road is read at a part of the way to the displaced cells, and this part is an unknown like the pressures and the
-!> tractions. The plane is the equation that it needs: the next solution is sought on the plane through a predicted state,
-!> perpendicular to the path (H. B. Keller, in: Applications of bifurcation theory, Academic Press 1977, 359). A path may
-!> therefore turn back, with a smaller part, and forward again.
+!> On a path the road is read at a part of the way to the displaced cells, and this part is an unknown like the pressures
+!> and the tractions. The plane is the equation that it needs: the next solution is sought on the plane through a predicted
+!> state, perpendicular to the path (H. B. Keller, in: Applications of bifurcation theory, Academic Press 1977, 359). A path
+!> may therefore turn back, with a smaller part, and forward again.
 !>
 !> Lengths of states are measured by the scaled unknowns of the cells in contact and the part:
 !>

@@ -18,7 +18,7 @@ from ..base.files import (
     write_text,
 )
 
-__all__ = ["add_columns", "add_fit", "add_import", "columns_of"]
+__all__ = ["add_fit", "add_import", "add_table", "table_options"]
 
 
 def add_import(verbs: Any) -> None:
@@ -101,7 +101,7 @@ def add_fit(verbs: Any) -> None:
     parser.add_argument("--least-plateau", type=float, default=0.01, metavar="SHARE",
                         help="smallest plateau modulus as a share of the lowest storage modulus"
                              " (default: 0.01)")
-    add_columns(parser, "the table")
+    add_table(parser, "the table")
     parser.add_argument("--poisson", type=float, default=0.5, metavar="NU",
                         help="Poisson ratio (default: 0.5)")
     parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
@@ -121,7 +121,7 @@ def add_fit(verbs: Any) -> None:
     parser.set_defaults(call=_fit)
 
 
-def add_columns(parser: argparse.ArgumentParser, table: str) -> None:
+def add_table(parser: argparse.ArgumentParser, table: str) -> None:
     """Add the options that say what the columns of a DMA table are."""
     parser.add_argument("--column", action="append", default=[], metavar="ROLE=NAME|N",
                         help=f"name or number (from 1) of the column of {table} for a role:"
@@ -135,8 +135,8 @@ def add_columns(parser: argparse.ArgumentParser, table: str) -> None:
                              " shear")
 
 
-def columns_of(chosen: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `add_columns` as arguments of `asperity.dma.read_dma`."""
+def table_options(chosen: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of `add_table` as arguments of `asperity.dma.read_dma`."""
     columns = {}
     for given in chosen.column:
         role, equals, name = given.partition("=")
@@ -192,7 +192,7 @@ def _fit(chosen: argparse.Namespace) -> int:
 
     _check_outputs(chosen)
     output = chosen.output
-    table = read_dma(chosen.table, poisson=chosen.poisson, **columns_of(chosen))
+    table = read_dma(chosen.table, poisson=chosen.poisson, **table_options(chosen))
     fit = fit_dma(
         table, arms_per_decade=chosen.arms_per_decade, reference=chosen.reference,
         wlf=chosen.wlf, temperature_tolerance=chosen.temperature_tolerance,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.files import check_folder
-from .data import add_columns, columns_of
+from .data import add_table, table_options
 
 if TYPE_CHECKING:
     from ..results.friction_curve import FrictionCurve
@@ -143,7 +143,7 @@ def _add_road(parser: argparse.ArgumentParser) -> None:
 
 def _add_rubber(parser: argparse.ArgumentParser) -> None:
     """Add the options for the fit of a DMA table."""
-    add_columns(parser, "a DMA table")
+    add_table(parser, "a DMA table")
     parser.add_argument("--wlf", nargs="+", type=float, metavar=("C1", "C2"),
                         help="constants of the shift of a DMA table, see `fit`")
     parser.add_argument("--reference", type=float, metavar="T",
@@ -198,7 +198,7 @@ def _friction(chosen: argparse.Namespace) -> int:
     compound = compound_of(chosen.material, wlf=chosen.wlf, reference=chosen.reference,
                            vertical=chosen.vertical,
                            temperature_tolerance=chosen.temperature_tolerance,
-                           **columns_of(chosen))
+                           **table_options(chosen))
     plan = plan_curve(road, compound, speeds=chosen.speeds, pressures=chosen.pressures,
                       temperatures=chosen.temperatures, patches=chosen.patches,
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,

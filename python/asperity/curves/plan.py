@@ -38,7 +38,9 @@ _OTHER_WORK = 8.0
 _RUN, _COMMAND = 0.02, 2.5
 _RANGE = 1e-30, 1e30    # allowed speeds, m/s, and pressures, Pa
 _LARGEST_COEFFICIENT = 1000.0  # that of steady phases
-_MOST_PRESSURE, _LEAST_PRESSURE = 40.0, 1e-5  # usual pressures, over the relaxed modulus
+# Pressures over the relaxed modulus G beyond which one of them may be in another unit. The program
+# warns of its runs above 10 E*, which is 40 G if the rubber is incompressible.
+_MOST_PRESSURE, _LEAST_PRESSURE = 40.0, 1e-5
 _MOST_SPEED = 100.0     # m/s, far above the speed of shear waves in rubber
 _WEDGING = 0.4          # coefficient times rms slope from which a road may wedge the rubber
 _COMMAND_MEMORY = 130e6  # bytes, for the command itself
