@@ -245,12 +245,12 @@ contains
       case%phases(3)%steady = .true.
       call check_close(joint_memory(case), 111.0_dp*8*64*32, 1.0e-9_dp, 'memory: a steady row solved all at once')
       case%friction%law = 'coulomb'
-      call check_close(joint_memory(case), 443.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
+      call check_close(joint_memory(case), 446.0_dp*8*64*32, 1.0e-9_dp, 'memory: the same with friction')
       case%phases(3)%steady = .false.
       in_time = case
       in_time%phases(3)%static = .false.
       in_time%phases(3)%steps = 1
-      call check_close(joint_memory(in_time), 443.0_dp*8*64*32, 1.0e-9_dp, 'memory: a time step solved all at once')
+      call check_close(joint_memory(in_time), 446.0_dp*8*64*32, 1.0e-9_dp, 'memory: a time step solved all at once')
       case%friction%law = 'none'
       case%phases(3)%velocity_y = 0.0_dp
       case%material%prony_g = [1.0_dp, 2.0_dp]

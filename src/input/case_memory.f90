@@ -25,9 +25,9 @@ module case_memory
    !> The same of a steady row without friction.
    real(dp), parameter :: newton_fields = 11.0_dp, newton_directions = 50.0_dp
    real(dp), parameter :: tile_fields = 50.0_dp       !! the inverses on tiles of the contact of a steady row
-   !> Further fields on a path of solutions: three states, the plane across it (module `joint_plane`), and the places where
-   !> the road is read.
-   real(dp), parameter :: path_fields = 28.0_dp
+   !> Further fields on a path of solutions: three states, the plane across it with two vectors of three numbers per cell
+   !> in contact (module `joint_plane`), and the two places between which the road is read.
+   real(dp), parameter :: path_fields = 31.0_dp
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 

@@ -85,16 +85,18 @@ contains
    end subroutine prepare
 
    !> Set the rules and the units, and make the first state from that of the contact.
-   subroutine start(self, contact, plan, begun)
+   subroutine start(self, contact, plan, begun, done)
       class(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout), target :: contact      !! until the step is solved
       type(planned_row_type), intent(in) :: plan
       type(joint_state_type), intent(inout) :: begun
+      logical, intent(out) :: done                     !! .false.: there is not enough memory
 
       self%contact => contact
       self%plan = plan
       self%grid = contact%grid
-      call find_responses(self, contact)
+      call find_responses(self, contact, done)
+      if (.not. done) return
       self%evaluations = 2                             ! the responses take almost as many transforms
       self%level_is_given = plan%control == 'displacement'
       self%most_evaluations = most_evaluations
@@ -111,16 +113,20 @@ contains
       end associate
    end subroutine start
 
-   !> Find the displacements around a cell under its unit pressure and its unit tractions: ten transforms.
-   subroutine find_responses(self, contact)
+   !> Find the displacements around a cell under its unit pressure and its unit tractions: ten transforms. `done` is
+   !> .false. if there is not enough memory.
+   subroutine find_responses(self, contact, done)
       type(joint_equations_type), intent(inout) :: self
       class(contact_type), intent(inout) :: contact
+      logical, intent(out) :: done
       real(dp), allocatable :: load(:, :), u(:, :), traction(:, :, :), shear(:, :, :)
-      integer :: c, k, nx, ny
+      integer :: c, k, nx, ny, status
 
       nx = self%grid%nx
       ny = self%grid%rows()
-      allocate (load(nx, ny), u(nx, ny), traction(nx, ny, 2), shear(nx, ny, 2), source=0.0_dp)
+      allocate (load(nx, ny), u(nx, ny), traction(nx, ny, 2), shear(nx, ny, 2), source=0.0_dp, stat=status)
+      done = .not. any_process(status /= 0)
+      if (.not. done) return
       if (self%grid%first_row == 1 .and. ny > 0) load(1, 1) = 1.0_dp
       call self%operator%apply(load, u)
       self%near%depth = near_values(self%grid, u, even)/contact%material%q

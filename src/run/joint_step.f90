@@ -6,7 +6,7 @@
 !> pass, a path of solutions is followed (module `joint_path`): from this result, with the road at the place of the pass,
 !> to the solution, with the road at the displacement that the traction causes.
 !>
-!> Memory from the first use on: 30 fields of doubles, and the directions of GMRES; on a path 25 fields more. If there is
+!> Memory from the first use on: 30 fields of doubles, and the directions of GMRES; on a path 31 fields more. If there is
 !> not enough memory, the step is not solved.
 module joint_step
    use asperity_schedule, only : planned_row_type
@@ -44,6 +44,7 @@ contains
       logical, intent(in) :: thorough                  !! Newton's method may take long, and a path may be followed
       logical, intent(out) :: solved
       integer, intent(out) :: transforms               !! number of transforms
+      logical :: has_memory
 
       solved = .false.
       transforms = 0
@@ -54,7 +55,8 @@ contains
          call self%destroy()
          return
       end if
-      call self%equations%start(contact, plan, self%newton%now)
+      call self%equations%start(contact, plan, self%newton%now, has_memory)
+      if (.not. has_memory) return
       self%newton%steps_to_halve = merge(0, impatient, thorough)
       call self%newton%solve(self%equations, contact%case%solver%tolerance, solved)
       transforms = 6*self%equations%evaluations
@@ -73,8 +75,8 @@ contains
       real(dp), intent(in) :: place(:, :, :)
       logical, intent(out) :: solved
 
-      call self%equations%start(contact, plan, self%newton%now)
-      call self%equations%set_origin(place, solved)
+      call self%equations%start(contact, plan, self%newton%now, solved)
+      if (solved) call self%equations%set_origin(place, solved)
       if (.not. solved) return
       call follow_path(self%newton, self%equations, contact%case%solver%tolerance, solved)
    end subroutine follow

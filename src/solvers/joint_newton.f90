@@ -6,7 +6,7 @@
 !> cells, which removes the jump. This rise is then reduced to zero (`reduce_rise`).
 !>
 !> Memory: 25 fields of doubles, the directions of GMRES with 3 numbers in single precision per unknown cell
-!> and direction, and the approximate inverse; on a path 21 fields more. If there is not enough memory, nothing is solved.
+!> and direction, and the approximate inverse; on a path 27 fields more. If there is not enough memory, nothing is solved.
 module joint_newton
    use asperity_parallel, only : any_process
    use asperity_precision, only : dp

@@ -49,8 +49,8 @@ MEANINGS = {
     "loss_octave": ("W/m2", "loss in the rubber by octave of the wavelength, mean over patches"),
     "loss_arm": ("W/m2", "loss in the rubber by arm of the Prony series, mean over patches"),
     "converged": ("1", "1 if the solver has converged; 0 for a state that is left out"),
-    "warned": ("1", "sum of 2^(n - 1) over the warnings n about the state, which are numbered in"
-                    " the attribute `warnings`"),
+    "warned": ("1", "sum of 2^(n - 1) over the first 31 warnings n about the state, which are"
+                    " numbered in the attribute `warnings`"),
     "octave": ("m", "longest wavelength of the octave"),
     "relaxation_time": ("s", "relaxation time of the arm at the reference temperature"),
     "a_t": ("1", "shift of the relaxation times"),

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, number
+from .windows import map_window
 
 __all__ = ["JOINS", "join", "load_at_join", "margin_of", "smooth_part", "strip"]
 
@@ -101,9 +102,7 @@ def join(height: FloatArray, method: str, shape: tuple[int, int] | None = None) 
         return wide if height.shape[0] == 1 else np.concatenate([wide, wide[::-1]], axis=0)
     if method == "window":
         mean = float(height.mean())
-        ny, nx = height.shape
-        rows = np.ones(1) if ny == 1 else _taper(ny)
-        return mean + rows[:, None] * _taper(nx) * (height - mean)
+        return mean + map_window(height.shape, TAPER) * (height - mean)
     if method in ("seam", "blend"):
         if shape is None:
             raise ValueError(f"shape: {method!r} needs the cells of the periodic map")
@@ -198,13 +197,6 @@ def load_at_join(pressure: FloatArray, method: str) -> tuple[float, float]:
     else:
         near = strip(pressure.shape, TAPER if method == "window" else MARGIN)
     return float(pressure[near].sum() / pressure.sum()), float(near.mean())
-
-
-def _taper(count: int) -> FloatArray:
-    """Return a window with cosine flanks at the centres of cells."""
-    place = (np.arange(count) + 0.5) / count
-    ramp = np.clip(2.0 * np.minimum(place, 1.0 - place) / TAPER, 0.0, 1.0)
-    return 0.5 * (1.0 - np.cos(math.pi * ramp))
 
 
 def _overlaid(height: FloatArray, method: str, shape: tuple[int, int]) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import number, whole
+from .windows import map_window
 
 __all__ = ["MapWork", "fit_terms", "polynomial"]
 
@@ -127,11 +127,9 @@ class MapWork:
 
     def window(self, kind: str, taper: float, restore: bool) -> None:
         """Bring the edges to the mean height by a window, which makes the map periodic."""
-        ny, nx = self.height.shape
         mean = float(np.mean(self.height))
         before = float(np.std(self.height))
-        shape = _tukey(nx, taper) * (np.ones(1) if ny == 1 else _tukey(ny, taper))[:, None]
-        windowed = shape * (self.height - mean)
+        windowed = map_window(self.height.shape, taper) * (self.height - mean)
         after = float(np.std(windowed))
         factor = before / after if restore and after > 0.0 else 1.0
         self.height = mean + factor * windowed
@@ -230,11 +228,3 @@ def _along_rows(height: FloatArray, count: int, periodic: bool) -> FloatArray:
     else:
         spline = CubicSpline(centres, height, axis=1)
     return np.asarray(spline(wanted))
-
-
-def _tukey(count: int, taper: float) -> FloatArray:
-    """Return a window at the centres of cells: cosine flanks over `taper` of the length."""
-    place = (np.arange(count) + 0.5) / count
-    near = np.minimum(place, 1.0 - place)  # distance from the nearer edge
-    ramp = np.clip(2.0 * near / taper, 0.0, 1.0)
-    return 0.5 * (1.0 - np.cos(math.pi * ramp))

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import array_of, positive
+from .map_work import fit_terms, polynomial
 from .mode_cells import mean_densities
 from .profile_fit import isotropic_fit
+from .windows import map_window
 
 __all__ = ["Spectrum", "isotropic_of_profile", "join_spectra", "name_of_several",
            "spectrum_of_map"]
@@ -228,7 +230,7 @@ def spectrum_of_map(height: FloatArray, lx: float, ly: float, *, periodic: bool 
     weights = np.ones_like(height)
     if not periodic:
         height = height - height.mean() if ny == 1 else _levelled(height)
-        weights = _hann(nx) * (np.ones((1, 1)) if ny == 1 else _hann(ny)[:, None])
+        weights = map_window(height.shape)
     modes = np.fft.rfft2((height - np.average(height, weights=weights)) * weights)
     power = np.abs(modes)**2 / (nx * ny * float(np.sum(weights**2)))
     kx = 2.0 * math.pi * np.fft.rfftfreq(nx, lx / nx)
@@ -385,16 +387,9 @@ def name_of_several(names: Iterable[str]) -> str:
 
 def _levelled(height: FloatArray) -> FloatArray:
     """Return a map without its mean plane."""
-    ny, nx = height.shape
-    x, y = np.linspace(-1.0, 1.0, nx), np.linspace(-1.0, 1.0, ny)[:, None]
-    height = height - height.mean()
-    height = height - x * float(np.sum(height * x) / (ny * np.sum(x**2)))
-    return height - y * float(np.sum(height * y) / (nx * np.sum(y**2)))
-
-
-def _hann(count: int) -> FloatArray:
-    """Return Hann's window at the centres of cells."""
-    return 0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count)
+    basis, _ = polynomial(height.shape, "tilt")
+    fit = fit_terms(height, np.isfinite(height), basis)
+    return np.asarray(height - sum(c * term for c, term in zip(fit, basis, strict=True)))
 
 
 def _reliable(psd: FloatArray, length: float, cell: float, name: str) -> tuple[float, float]:

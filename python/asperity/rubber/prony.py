@@ -1,4 +1,4 @@
-"""Linear viscoelastic materials: Prony series, Zener branches, WLF shift, fit to DMA data.
+"""The Prony series of a linear viscoelastic material: its moduli, its shift, and its fit to data.
 
 A material is the shear relaxation modulus ::
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..results.derived import travel
 from ..results.settings import has_friction
 from ..roads import surface
+from ..rubber.prony import Prony
 from .colour_scales import scale_ends, without_round_off
 from .plot_fields import traction_samples
 from .report_charts import MOST_SNAPSHOTS, charts_of
@@ -46,8 +47,11 @@ def page_data(run: Run) -> dict[str, Any]:
     Returns
     -------
     dict
-        'columns' (the rows of the history that are kept), 'axes' (choices of the horizontal axis),
-        'charts', 'grid', 'snapshots', 'spectrum' (of the road), 'maps' (names of the fields).
+        'title'; 'axes', the choices of the horizontal axis; 'columns', the rows of the history
+        that are kept; 'rows', their number and that of all rows; 'charts'; 'grid', also of the
+        reduced maps; 'friction', whether there is a friction law; 'snapshots', and 'stored', the
+        number of those in the result; 'spectrum' of the road and 'spectrum_units'; 'modulus' of
+        the rubber against frequency.
     """
     rows = kept_rows(run)
     columns, charts = charts_of(run)
@@ -82,7 +86,7 @@ def kept_rows(run: Run) -> NDArray[np.intp]:
     kept = {0, rows - 1}
     edges = np.linspace(0, rows, MOST_ROWS // 4 + 1).astype(int)
     for first, behind in zip(edges[:-1], edges[1:], strict=True):
-        for name in ("friction", "contact_area"):
+        for name in (name for name in ("friction", "contact_area") if name in run.history):
             part = run.history[name][first:behind]
             kept.update((first + int(np.argmin(part)), first + int(np.argmax(part))))
     return np.array(sorted(kept))
@@ -290,12 +294,11 @@ def _modulus(run: Run) -> dict[str, Any] | None:
     times = np.atleast_1d(run.material.get("prony_tau", np.zeros(0)))
     if not len(arms) or len(arms) != len(times) or not np.any(arms):
         return None
-    spring = float(run.material.get("shear_modulus", 0.0))
+    material = Prony(float(run.material.get("shear_modulus", 0.0)), arms, times)
     omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 200)
-    product = omega[:, None] * times
-    storage = spring + np.sum(arms * product**2 / (1.0 + product**2), axis=1)
-    loss = np.sum(arms * product / (1.0 + product**2), axis=1)
-    return {"omega": _numbers(omega), "storage": _numbers(storage), "loss": _numbers(loss)}
+    modulus = material.complex_modulus(omega)
+    return {"omega": _numbers(omega), "storage": _numbers(modulus.real),
+            "loss": _numbers(modulus.imag)}
 
 
 def now() -> str:
