@@ -37,8 +37,9 @@ def main(arguments: list[str] | None = None) -> int:
     except MemoryError as error:
         return _fail(MemoryError(f"not enough memory: {error}" if str(error) else
                                  "not enough memory"), 4)
-    except KeyboardInterrupt:
-        return _fail(KeyboardInterrupt("stopped by Ctrl-C"), 128 + signal.SIGINT)
+    except KeyboardInterrupt as stop:
+        more = f": {stop}" if str(stop) else ""
+        return _fail(KeyboardInterrupt(f"stopped by Ctrl-C{more}"), 128 + signal.SIGINT)
 
 
 def _run(arguments: list[str]) -> int:

@@ -189,6 +189,39 @@ def test_temperatures_that_scatter_belong_together(tmp_path):
         fit_dma(table)
 
 
+@pytest.mark.parametrize("place", [0, 1, 9, 18, 19])
+@pytest.mark.parametrize("factor", [0.1, 3.0])
+def test_a_modulus_that_does_not_fit_its_neighbours_is_noted(place, factor):
+    """A typing error moves the master curve, however many points it has."""
+    omega = np.tile(TWO_PI * np.logspace(-1, 2, 20), 3)
+    temperature = np.repeat([0.0, 20.0, 40.0], 20)
+    modulus = np.concatenate([RUBBER.shifted(t, SHIFT).complex_modulus(omega[:20])
+                              for t in (0.0, 20.0, 40.0)])
+    storage = modulus.real * noise(1, 60, 0.01)
+    loss = modulus.imag * noise(2, 60, 0.01)
+    assert not any("neighbours" in note
+                   for note in fit_dma(DmaTable(omega, storage, loss, temperature)).notes)
+    for name, values in (("storage", storage), ("loss", loss)):
+        wild = values.copy()
+        wild[20 + place] *= factor
+        table = DmaTable(omega, *((wild, loss) if name == "storage" else (storage, wild)),
+                         temperature)
+        (note,) = (note for note in fit_dma(table).notes if "neighbours" in note)
+        assert note.startswith(f"the {name} modulus {wild[20 + place]:.4g} Pa at 20 C and")
+        found = float(re.search(r"is ([\d.]+) times", note).group(1))
+        assert found == pytest.approx(factor, rel=0.15)
+        assert ";" not in note
+
+
+def test_the_picture_of_a_fit_shows_all_data():
+    omega = np.logspace(-1, 4, 40)
+    modulus = RUBBER.complex_modulus(omega)
+    storage = modulus.real.copy()
+    storage[20] *= 30.0
+    axes = fit_dma(DmaTable(omega, storage, modulus.imag)).plot().axes[0]
+    assert axes.get_ylim()[1] > storage.max()
+
+
 def drifting(tmp_path, temperatures, drift):
     """Return a table whose temperature drifts in each sweep, over the part of it that is done."""
     done = np.linspace(0.0, 1.0, len(FREQUENCIES))

@@ -33,6 +33,7 @@ from asperity.results.friction_curve import COLUMNS, _rounded, interval
 from asperity.roads.outliers import find_outliers
 from asperity.rubber.compound import Compound
 from asperity.runs.means import Means
+from asperity.views.style import distinct_colours
 
 ROAD = "self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=2.5e-4,rms_slope=0.15"
 RUBBER = Prony(1e6, [3e6, 5e6, 8e6], [1e-4, 1e-3, 1e-2])
@@ -612,10 +613,14 @@ def test_contribution_of_waves_that_are_left_out(curve):
 
 
 def test_picture(curve, tmp_path):
+    names = ["friction coefficient", "friction by loss in the rubber", "contact area fraction"]
+    single = of_first_pressure(curve).plot()
+    assert [panel.get_ylabel() for panel in single.axes] == names
+    # Two pressures and two temperatures: a row of panels for each pressure.
     figure = curve.plot()
-    labels = [panel.get_ylabel() for panel in figure.axes]
-    assert labels == ["friction coefficient", "friction by loss in the rubber",
-                      "contact area fraction"]
+    assert [panel.get_title() for panel in figure.axes] == [*names, "", "", ""]
+    rows = [[text.get_text() for text in panel.texts] for panel in figure.axes]
+    assert rows[0] and rows[3] and rows[0] != rows[3] and not any(rows[1:3] + rows[4:])
     # The legend must be beside the panels, where it hides no curve.
     assert not any(panel.get_legend() for panel in figure.axes)
     figure.savefig(tmp_path / "curve.png")
@@ -626,8 +631,29 @@ def test_picture(curve, tmp_path):
     assert (tmp_path / "curve.png").stat().st_size > 20000
 
 
+def of_first_pressure(curve):
+    """Return a curve with the first pressure only."""
+    return replace(curve, pressure=curve.pressure[:1], remarks=[], losses={}, sources={},
+                   values={name: array[:1] for name, array in curve.values.items()},
+                   theory={name: array[:1] for name, array in curve.theory.items()})
+
+
+def test_wide_intervals_leave_the_curves_readable(curve):
+    """The interval of two patches may be many times as wide as the curve."""
+    wild = of_first_pressure(curve)
+    for name in ("friction", "friction_loss", "contact_area"):
+        wild.values[name] = wild.values[name] * np.geomspace(0.01, 2.0, len(curve.patches))
+    theories = {"friction": "", "friction_loss": "friction_persson", "contact_area": "area_persson"}
+    for panel, (name, theory) in zip(wild.plot().axes, theories.items(), strict=True):
+        mean, low, high = wild.mean(name)
+        most = max(mean.max(), wild.theory[theory].max() if theory else 0.0)
+        bottom, top = panel.get_ylim()
+        assert (low < 0.0).any() and high.max() > 2.2 * mean.max()
+        assert 0.0 <= bottom < mean.min() and mean.max() < top < 2.2 * most
+
+
 def test_a_picture_of_many_curves_has_a_colour_for_each_and_room_for_the_panels(curve):
-    """With 24 curves the palette would repeat, and the legend would leave no room for panels."""
+    """With 12 pressures the palette would repeat, and the legend would leave no room for panels."""
     times = 12 // curve.pressure.size
     many = replace(curve, pressure=np.geomspace(1e4, 1e6, 12), losses={}, remarks=[], sources={},
                    values={name: np.concatenate([array] * times)
@@ -639,9 +665,10 @@ def test_a_picture_of_many_curves_has_a_colour_for_each_and_room_for_the_panels(
     names = {text.get_text() for text in figure.legends[0].get_texts()}
     lines = [line for line in figure.axes[0].lines if line.get_label() in names]
     curves = [line for line in lines if "Pa" in str(line.get_label())]
-    assert len({line.get_color() for line in curves}) == len(curves) == 24
+    assert len({line.get_color() for line in curves}) == len(curves) == 12
+    assert len(figure.axes) == 2 * 3
     heights = [panel.get_window_extent().height / figure.dpi for panel in figure.axes]
-    assert min(heights) > 1.5
+    assert min(heights) > 1.2
     legend = figure.legends[0].get_window_extent()
     assert not any(panel.get_window_extent().overlaps(legend) for panel in figure.axes)
     assert legend.y0 >= 0.0
@@ -691,13 +718,14 @@ def test_a_single_point_shows_its_interval_and_the_theory(curve):
 
 
 def test_intervals_below_zero_reach_the_edge_of_a_logarithmic_axis(curve):
-    panel = scattered(curve).plot().axes[-1]
+    panel = scattered(curve).plot().axes[2]  # of the first pressure
     bottom = panel.get_ylim()[0]
     lowest = [one.get_paths()[0].vertices[:, 1].min() for one in panel.collections]
     assert min(lowest) == bottom > 0.0
     assert all(low >= bottom for low in lowest)
-    drawn = np.concatenate([line.get_ydata() for line in panel.lines])
-    assert 0.3 * drawn.min() < bottom < drawn.min()
+    drawn = np.concatenate([scattered(curve).mean("contact_area")[0].ravel(),
+                            curve.theory["area_persson"].ravel()])
+    assert bottom == 0.5 * drawn.min()
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
@@ -764,11 +792,10 @@ def six_temperatures(curve):
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium with chromedriver")
-def test_many_curves_have_the_same_colours_on_the_page_as_in_the_picture(curve, tmp_path):
+def test_many_curves_have_a_colour_each_on_the_page(curve, tmp_path):
     """The page repeated its seven colours from the eighth curve on."""
     many = six_temperatures(curve)
-    wanted = [line.get_color() for line in many.plot().axes[0].lines if line.get_marker() == "o"]
-    assert len(set(wanted)) == 12
+    wanted = distinct_colours(12)
     page = many.to_html(tmp_path / "curve.html")
     drawn = ("return [...document.querySelectorAll('#curves figure:first-child path.line')].map("
              "(path) => getComputedStyle(path).stroke.match(/\\d+/g).map((part) =>"

@@ -221,6 +221,10 @@ def _friction(chosen: argparse.Namespace) -> int:
     except SubmittedError as message:
         print(message)
         return 0
+    except KeyboardInterrupt:
+        again = " without --no-resume" if chosen.no_resume else ""
+        raise KeyboardInterrupt(
+            f"the same command{again} goes on with what is in {folder}") from None
     print(curve.summary(plan.all_notes))
     for output in outputs:
         write_output(output, folder, code, lambda name: _write(curve, name))

@@ -373,7 +373,8 @@ class FrictionCurve:
         for at, row in zip(points, self.rows(), strict=True):
             low, high = row[4:6]
             known = f"{_rounded(low)}..{_rounded(high)}" if math.isfinite(low) else "-"
-            cells = (f"{row[0]:.4g}", f"{row[1]:g}", f"{row[2]:.4g}", _rounded(row[3]), known,
+            temperature = f"{row[1]:g}" if math.isfinite(row[1]) else "-"
+            cells = (f"{row[0]:.4g}", temperature, f"{row[2]:.4g}", _rounded(row[3]), known,
                      _rounded(row[6]), f"{row[7]:.4g}", _rounded(row[9]), str(row[10]))
             lines.append("  ".join(cell.rjust(max(9, len(head)))
                                    for cell, head in zip(cells, heads, strict=True))
@@ -385,7 +386,8 @@ class FrictionCurve:
 
     def settings_text(self) -> Mapping[str, str]:
         """Return the settings of the computation as text."""
-        return {name: str(value) for name, value in self.settings.items()}
+        return {name: f"{value:.10g}" if isinstance(value, float) else str(value)
+                for name, value in self.settings.items()}
 
 
 def _rounded(friction: float) -> str:

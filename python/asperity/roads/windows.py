@@ -55,7 +55,7 @@ def map_window(shape: tuple[int, int], taper: float = 1.0) -> FloatArray:
 
     Examples
     --------
-    >>> map_window((1, 2)).tolist()
+    >>> map_window((1, 2)).round(2).tolist()
     [[0.5, 0.5]]
     """
     ny, nx = shape

@@ -15,6 +15,7 @@ from ..base.check import instance, number, positive, shown
 from ..base.files import SHIFTS, SHIFTS_HEAD, check_output, write_text
 from ..base.names import counted
 from ..base.presenters import present
+from .dma_outliers import outlier_notes
 from .dma_sweeps import Sweep, drift_note, sweeps_of
 from .dma_table import DmaTable
 from .master_curve import MasterCurve, master_curve
@@ -276,6 +277,7 @@ def fit_dma(
             notes.append("the temperatures form no sweeps of the frequency: the constants shift"
                          " each point from its own temperature")
         notes += drift_note(table.temperature, sweeps)
+    notes += outlier_notes(table, sweeps)
     found = _shifted(table, sweeps, constants, reference, temperature_tolerance, vertical)
     notes += found.notes
     reduced = table.omega * 10.0**found.log_shift

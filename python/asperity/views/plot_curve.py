@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
@@ -23,12 +24,16 @@ if TYPE_CHECKING:
 
     from ..results.friction_curve import FrictionCurve
 
+    FloatArray = NDArray[np.float64]
+
 __all__ = ["plot_friction_curve"]
 
 _MARKERS = "o", "x"  # of points with warnings, and of those with states that are left out
 _LEGEND_COLUMNS = 4
 _MOST_KEYS = 4          # interval, theory and the two markers
 _LEGEND_ROW = 0.16      # height of a row of the legend, inches
+_ONLY_ROW = 2.5         # height of the panels if there is a single row, inches
+_ROW = 1.8              # and of each of several rows
 _FEW_DECADES = 1000.0   # ratio of the ends of an axis up to which 1, 2 and 5 are labelled
 
 
@@ -36,8 +41,9 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     """Draw friction and contact area with their 95 % intervals; Persson's theory is dashed.
 
     They are drawn against the speed or, for a single speed, against the pressure or the
-    temperature. Each combination of the other two has its own colour. Rings mark points with
-    warnings, crosses those at which states are left out because the solver did not converge.
+    temperature. If two other quantities have several values, the one with fewer values has a row of
+    panels for each, and the other one has the colours. Rings mark points with warnings, crosses
+    those at which states are left out because the solver did not converge.
 
     Parameters
     ----------
@@ -48,63 +54,158 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     -------
     matplotlib.figure.Figure
     """
-    axes = {"speed": curve.speed, "pressure": curve.pressure, "temperature": curve.temperature}
-    along = next((name for name, values in axes.items() if values.size > 1), "speed")
-    order = ("pressure", "temperature", "speed")
-    place = order.index(along)
-    # A single point has neither a ribbon nor a line: its interval is a bar, the theory a dash.
-    alone = axes[along].size == 1
-    dashes = "_" if alone else "--"
+    plan = _plan_of(curve)
+    colours = plan.values(plan.colours)
+    keys = (colours.size if colours.size > 1 else 1) + _MOST_KEYS
+    legend = -(-keys // _LEGEND_COLUMNS)
+    count = plan.values(plan.rows).size
     with print_style():
-        panels = [("friction", "", "friction coefficient"),
-                  ("friction_loss", "friction_persson", "friction by loss in the rubber"),
-                  ("contact_area", "area_persson", "contact area fraction")]
-        if not float(curve.settings.get("coefficient", 0.0)):
-            panels = panels[1:]  # without friction in the interface all of it is loss in the rubber
-        others = [name for name in order if name != along]
-        combinations = list(np.ndindex(*(axes[name].size for name in others)))
-        rows = -(-(len(combinations) + _MOST_KEYS) // _LEGEND_COLUMNS)
-        figure, places = plt.subplots(1, len(panels), layout="constrained",
-                                      figsize=(DOUBLE_COLUMN, 2.5 + _LEGEND_ROW * rows))
-        floor = _floor(curve)
-        flagged = [np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True)]
-        for at, colour in zip(combinations, distinct_colours(len(combinations)), strict=True):
-            where = list(at)
-            where.insert(place, slice(None))
-            label = ", ".join(_words(name, float(axes[name][i]))
-                              for name, i in zip(others, at, strict=True) if axes[name].size > 1)
-            for panel, (name, theory, _) in zip(places, panels, strict=True):
-                mean, low, high = (part[tuple(where)] for part in curve.mean(name))
-                if panel is places[-1]:
-                    low = np.where(low <= 0.0, floor, low)
-                if alone:
-                    panel.vlines(axes[along], low, high, color=colour, alpha=0.4, linewidth=3.0)
-                else:
-                    panel.fill_between(axes[along], low, high, color=colour, alpha=0.2, linewidth=0)
-                panel.plot(axes[along], mean, "o-", color=colour, label=label or "runs")
-                _mark(panel, axes[along], mean, [one[tuple(where)] for one in flagged], colour)
-                if theory:
-                    panel.plot(axes[along], curve.theory[theory][tuple(where)], dashes,
-                               color=colour, linewidth=0.9, markersize=7)
-        for panel, (_, _, text) in zip(places, panels, strict=True):
-            if along != "temperature":
-                panel.set_xscale("log")
-            panel.set_xlabel({"speed": "speed (m/s)", "pressure": "pressure (Pa)",
-                              "temperature": "temperature (°C)"}[along])
-            panel.set_ylabel(text)
-            panel.grid(alpha=0.3)
-        for panel in places[:-1]:
-            low, high = panel.get_ylim()
-            low = min(0.0, low)
-            panel.set_ylim(low, high + 0.05 * (high - low))
-        places[-1].set_yscale("log")
-        if (curve.mean("contact_area")[1] <= 0.0).any():
-            places[-1].set_ylim(bottom=floor)
-        _mark_decades(places[-1])
-        _legend(figure, places[0], flagged, dashes,
-                any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in panels))
+        height = _ROW * count if count > 1 else _ONLY_ROW
+        figure, grid = plt.subplots(
+            count, len(plan.panels), layout="constrained", squeeze=False, sharex=True, sharey="col",
+            figsize=(DOUBLE_COLUMN, height + _LEGEND_ROW * legend))
+        for row, places in enumerate(grid):
+            for index, colour in enumerate(distinct_colours(colours.size)):
+                _draw_line(curve, plan, places, plan.where(row, index), colour)
+            if count > 1:
+                _name_row(places[0], _words(plan.rows, float(plan.values(plan.rows)[row])))
+        _dress(curve, plan, grid)
+        for index, colour in enumerate(distinct_colours(colours.size)):
+            label = _words(plan.colours, float(colours[index])) if colours.size > 1 else "runs"
+            grid[0, 0].plot([], [], "o-", color=colour, label=label)
+        _legend(figure, grid[0, 0], _flags(curve), plan.dashes,
+                any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in plan.panels))
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return shown_once(figure)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What the panels of a picture show.
+
+    Attributes
+    ----------
+    axes : dict
+        The values of pressure, temperature and speed, in the order of the arrays of the curve.
+    along, rows, colours : str
+        The quantity along the horizontal axis, and those of the rows of panels and of the colours.
+    panels : list of (str, str, str)
+        Names of the variable and of its theory, and the label of the axis, from left to right.
+    """
+
+    axes: dict[str, FloatArray]
+    along: str
+    rows: str
+    colours: str
+    panels: list[tuple[str, str, str]]
+
+    def values(self, name: str) -> FloatArray:
+        """Return the values of a quantity."""
+        return self.axes[name]
+
+    @property
+    def dashes(self) -> str:
+        """How the theory is drawn: a single point has no line, so that it is a marker."""
+        return "_" if self.axes[self.along].size == 1 else "--"
+
+    def where(self, row: int, colour: int) -> tuple[int | slice, ...]:
+        """Return the place of a line in the arrays of the curve."""
+        index: dict[str, int | slice] = {self.along: slice(None), self.rows: row,
+                                         self.colours: colour}
+        return tuple(index[name] for name in self.axes)
+
+
+def _plan_of(curve: FrictionCurve) -> _Plan:
+    """Choose what the panels show."""
+    axes = {"pressure": curve.pressure, "temperature": curve.temperature, "speed": curve.speed}
+    along = next((name for name in ("speed", "pressure", "temperature") if axes[name].size > 1),
+                 "speed")
+    rows, colours = sorted((name for name in axes if name != along),
+                           key=lambda name: axes[name].size)
+    panels = [("friction", "", "friction coefficient"),
+              ("friction_loss", "friction_persson", "friction by loss in the rubber"),
+              ("contact_area", "area_persson", "contact area fraction")]
+    if not float(curve.settings.get("coefficient", 0.0)):
+        panels = panels[1:]  # without friction in the interface all of it is loss in the rubber
+    return _Plan(axes, along, rows, colours, panels)
+
+
+def _draw_line(curve: FrictionCurve, plan: _Plan, places: NDArray[Any],
+               where: tuple[int | slice, ...], colour: str) -> None:
+    """Draw one line in each panel of a row, with its interval, its marks and its theory."""
+    x = plan.values(plan.along)
+    flagged = [one[where] for one in _flags(curve)]
+    for panel, (name, theory, _) in zip(places, plan.panels, strict=True):
+        mean, low, high = (part[where] for part in curve.mean(name))
+        if name == "contact_area":
+            low = np.where(low <= 0.0, _floor(curve), low)
+        if x.size == 1:
+            panel.vlines(x, low, high, color=colour, alpha=0.4, linewidth=3.0)
+        else:
+            panel.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)
+        panel.plot(x, mean, "o-", color=colour)
+        _mark(panel, x, mean, flagged, colour)
+        if theory:
+            panel.plot(x, curve.theory[theory][where], plan.dashes, color=colour, linewidth=0.9,
+                       markersize=7)
+
+
+def _flags(curve: FrictionCurve) -> list[NDArray[np.bool_]]:
+    """Return the points with warnings, and those with states that are left out."""
+    return [np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True)]
+
+
+def _name_row(panel: Axes, text: str) -> None:
+    """Write the value of a row of panels into its first panel."""
+    panel.annotate(text, (0.0, 1.0), (4.0, -4.0), xycoords="axes fraction",
+                   textcoords="offset points", va="top", fontweight="bold", fontsize="small",
+                   bbox={"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1.0})
+
+
+def _dress(curve: FrictionCurve, plan: _Plan, grid: NDArray[Any]) -> None:
+    """Label and scale the axes.
+
+    The panels of a column share their scale. If there are several, they share a title, too, because
+    the text would be too long for the low panels.
+    """
+    for column, (_, _, text) in zip(grid.T, plan.panels, strict=True):
+        if len(column) > 1:
+            column[0].set_title(text)
+        else:
+            column[0].set_ylabel(text)
+        for panel in column:
+            if plan.along != "temperature":
+                panel.set_xscale("log")
+            panel.grid(alpha=0.3)
+        column[-1].set_xlabel({"speed": "speed (m/s)", "pressure": "pressure (Pa)",
+                               "temperature": "temperature (°C)"}[plan.along])
+    for panel, (name, theory, _) in zip(grid[0], plan.panels, strict=True):
+        _scale(panel, curve, name, theory)
+    for panel in grid[:, -1]:
+        _mark_decades(panel)
+
+
+def _scale(panel: Axes, curve: FrictionCurve, name: str, theory: str) -> None:
+    """Scale a vertical axis by the means and the theory.
+
+    The intervals of two patches are often many times as wide as the curve. They do not count beyond
+    twice the largest mean, or below half of the least one on a logarithmic axis.
+    """
+    found = curve.mean(name)[0]
+    if theory:
+        found = np.concatenate([found.ravel(), curve.theory[theory].ravel()])
+    found = found[np.isfinite(found)]
+    if name == "contact_area":
+        panel.set_yscale("log")
+        if found.max(initial=0.0) > 0.0:
+            low, high = panel.get_ylim()
+            panel.set_ylim(max(low, _floor(curve)), min(high, 2.0 * float(found.max())))
+    else:
+        least, most = (float(end) for end in (found.min(initial=0.0), found.max(initial=0.0)))
+        low, high = panel.get_ylim()
+        low = max(min(0.0, low), 2.0 * least)
+        high = min(high, 2.0 * most) if most > 0.0 else high
+        panel.set_ylim(low, high + 0.05 * (high - low))
 
 
 def _mark_decades(panel: Axes) -> None:
@@ -147,12 +248,12 @@ def _legend(figure: Figure, panel: Axes, flagged: list[NDArray[np.bool_]], dashe
 
 
 def _floor(curve: FrictionCurve) -> float:
-    """Return the lower edge of the contact area: half of the least value that is drawn.
+    """Return the least contact area that is drawn: half of the least mean, also of the theory.
 
     The logarithmic axis has no place for intervals that end at 0 or below. They reach this edge.
     """
-    mean, low, _ = curve.mean("contact_area")
-    drawn = np.concatenate([mean.ravel(), low.ravel(), curve.theory["area_persson"].ravel()])
+    drawn = np.concatenate([curve.mean("contact_area")[0].ravel(),
+                            curve.theory["area_persson"].ravel()])
     return 0.5 * float(np.min(drawn[drawn > 0.0], initial=1.0))
 
 
@@ -176,7 +277,7 @@ def _mark(panel: Axes, x: NDArray[Any], y: NDArray[Any], flagged: list[NDArray[n
 def _words(name: str, value: float) -> str:
     """Return a value with its unit."""
     if name == "temperature":
-        return f"{value:g} °C"
+        return f"{value:.4g} °C"
     unit = "Pa" if name == "pressure" else "m/s"
     factor, prefixed = si_scale(value, unit)
     return f"{value * factor:.3g} {prefixed}"

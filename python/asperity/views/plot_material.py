@@ -116,8 +116,9 @@ def plot_dma_fit(fit: DmaFit) -> Figure:
                label=r"arms $(1/\tau_k, g_k)$")
     visible = material.g[(1.0 / material.tau >= fine[0]) & (1.0 / material.tau <= fine[-1])]
     least = min(float(fit.loss.min()), float(visible.min(initial=np.inf)))
-    top.set_ylim(max(0.4 * least, 1e-3 * float(fit.loss.min())),
-                 2.5 * max(float(modulus.real.max()), float(visible.max(initial=0.0))))
+    most = max(float(part.max(initial=0.0))
+               for part in (modulus.real, visible, fit.storage, fit.loss))
+    top.set_ylim(max(0.4 * least, 1e-3 * float(fit.loss.min())), 2.5 * most)
     top.set_xlim(fine[0], fine[-1])
     for axes in (top, middle):
         axes.axvspan(fine[0], low, color="0.93", zorder=0)
