@@ -130,11 +130,16 @@ class CurvePlan:
             output=dict(snapshot_fields=["pressure"], snapshot_every=0))
         if series.g.size:
             groups["material"] |= dict(prony_g=series.g, prony_tau=series.tau)
+        label = f"{patch.label}, {self.pressure[i]:g} Pa"
+        celsius = float(self.temperature[j])
+        if math.isfinite(celsius):
+            # The series is that of this temperature already.
+            groups["material"] |= dict(temperature=celsius, reference_temperature=celsius)
+            label += f", {celsius:g} °C"
         if self.coefficient > 0.0:
             groups["friction"] = dict(law="coulomb", coefficient=self.coefficient,
                                       slope_effect=self.slope_effect)
-        return Case(title=f"{patch.label}, {self.pressure[i]:g} Pa, {self.temperature[j]:g} °C",
-                    **groups)
+        return Case(title=label, **groups)
 
     def transforms(self, celsius: float) -> float:
         """Return the estimated mean number of real transforms of a steady state.
