@@ -1290,7 +1290,7 @@ def test_each_road_may_have_its_own_unit_and_size(tmp_path, monkeypatch, capsys)
     assert whole.periodic and not first.periodic
 
     for words, message in (
-            (["a.txt", "b.txt"], "names no unit of length: give one .*; unit and size .* count"),
+            (["a.txt", "b.txt"], "names no unit and gives no lengths: .*; unit and size .* count"),
             (["a.txt:size=1000x1000", "c.h5", "--unit", "um"],
              "unit = 'um': c.h5 has its own unit, 'm'.* give a road its own, as ROAD:unit=um"),
             (["a.txt:units=um"], "'units=um': must be NAME=VALUE, NAME one of unit, size, channel"),

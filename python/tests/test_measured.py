@@ -457,8 +457,11 @@ def test_units(tmp_path, unit, metres):
 def test_unit_and_size_that_a_file_lacks(tmp_path):
     path = tmp_path / "map.npy"
     np.save(path, sample().T)
-    with pytest.raises(ValueError, match=r"map\.npy: names no unit of length: give one.*--unit"):
+    with pytest.raises(ValueError, match=r"map\.npy: names no unit and gives no lengths: give both"
+                                         r".*--unit um --size LX LY"):
         load(path)
+    with pytest.raises(ValueError, match=r"map\.npy: names no unit of length: give one.*--unit"):
+        load(path, size=(1.0, 1.0))
     with pytest.raises(ValueError, match=r"map\.npy: gives no lengths: give them.*--size"):
         load(path, unit="nm")
     with pytest.raises(ValueError, match="size: has 1 length, must have 2"):
@@ -885,7 +888,7 @@ def test_the_command_s_errors(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     np.save("map.npy", sample().T)
     assert main(["import", "map.npy"]) == 2
-    assert capsys.readouterr().err.startswith("asperity: map.npy: names no unit of length")
+    assert capsys.readouterr().err.startswith("asperity: map.npy: names no unit and")
     assert not (tmp_path / "surface.h5").exists()
     assert main(["import", "none.nc"]) == 3
     with pytest.raises(SystemExit):

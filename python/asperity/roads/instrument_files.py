@@ -302,7 +302,8 @@ def read_map(
                 f"{path}: channel {chosen.channel_id!r} is a line scan with points at uneven"
                 " distances: a run needs a regular grid; interpolate it first, as with"
                 " SurfaceTopography's to_uniform")
-        used = _used_unit(path, _unit_of(chosen.unit) or _dataset_unit(path, reader, chosen), given)
+        used = _used_unit(path, _unit_of(chosen.unit) or _dataset_unit(path, reader, chosen), given,
+                          lengths=chosen.physical_sizes is not None or size is not None)
         # The program reads the dataset `surface` with the shape (ny, nx), so that it has no other
         # meaning here. SurfaceTopography reads all datasets with x first.
         rows_first = reader.format() == _HDF5 and chosen.name == _SURFACE
@@ -358,16 +359,23 @@ def _dataset_unit(path: Path, reader: Any, chosen: Any) -> str | None:
         return unit_of_dataset(file[chosen.name])
 
 
-def _used_unit(path: Path, named: str | None, given: str | None) -> str:
-    """Return the unit that a file names, or the given one if it names none."""
+def _used_unit(path: Path, named: str | None, given: str | None, lengths: bool) -> str:
+    """Return the unit that a file names, or the given one if it names none.
+
+    If there is none, the message also says whether the `lengths` are missing, so that the user can
+    give both at once.
+    """
     if named is not None and named not in UNITS:
         raise ValueError(f"{path}: has the unit {named!r}: must be one of {', '.join(UNITS)}")
     if named is not None and given is not None and named != given:
         raise ValueError(f"unit = {given!r}: {path} has its own unit, {named!r}; `scale` scales"
                          " the heights")
     used = named or given
-    if used is None:
+    if used is None and lengths:
         raise ValueError(f"{path}: names no unit of length: give one (unit = 'um', --unit um)")
+    if used is None:
+        raise ValueError(f"{path}: names no unit and gives no lengths: give both (unit = 'um' and"
+                         " size = (lx, ly), --unit um --size LX LY)")
     return used
 
 
