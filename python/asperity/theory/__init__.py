@@ -16,15 +16,14 @@ from __future__ import annotations
 from .adhesive import AdhesiveContact, dmt, jkr, maugis, tabor_parameter
 from .hertzian import HertzContact, HertzLine, hertz, hertz_line
 from .rough import (
-    PerssonContact,
     bush_gibson_thomas,
-    persson,
     persson_area,
-    persson_speed_step,
     psd_moments,
     self_affine_psd,
     surface_psd,
 )
+from .sliding_rough import PerssonContact, persson
+from .speed_step import persson_speed_step
 from .tangential import MindlinContact, mindlin
 from .viscoelastic import HunterContact, LeeRadokContact, hunter, lee_radok
 from .wavy import FullContactWaves, WestergaardContact, full_contact_waves, westergaard
