@@ -21,7 +21,7 @@ program main
    use asperity_precision, only : dp
    use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
-   use asperity_signals, only : catch_signals, checkpoint_asked, forget_checkpoint, stop_signal, &
+   use asperity_signals, only : catch_signals, checkpoint_asked, end_with_parent, forget_checkpoint, stop_signal, &
       stop_signal_name
    use standard_streams, only : say, say_error
    use asperity_surface, only : check_files
@@ -143,6 +143,7 @@ contains
       if (allocated(error)) return
       if (command%threads > 0) case%solver%threads = command%threads
       call catch_signals()
+      call end_with_parent()
       if (case%warnings /= '' .and. is_first_process()) call say_error(case%warnings)
       call run_steps(case, error)
    end subroutine run

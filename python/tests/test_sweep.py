@@ -341,7 +341,7 @@ def rows_of(path):
         return 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_a_stopped_sweep_leaves_checkpoints_and_continues(tmp_path, number):
     process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(tmp_path)],
                                stderr=subprocess.PIPE, start_new_session=True,
@@ -355,8 +355,14 @@ def test_a_stopped_sweep_leaves_checkpoints_and_continues(tmp_path, number):
         time.sleep(0.02)
     process.send_signal(number)
     _, printed = process.communicate(timeout=PATIENCE)
-    assert process.returncode in (-signal.SIGINT, 128 + signal.SIGTERM, 130), printed
-    # No child process continues, and each has left a checkpoint.
+    assert process.returncode in {
+        signal.SIGINT: (-signal.SIGINT, 130), signal.SIGTERM: (128 + signal.SIGTERM,),
+        signal.SIGHUP: (128 + signal.SIGHUP,), signal.SIGKILL: (-signal.SIGKILL,)}[number], printed
+    # No child process continues, and each has left a checkpoint. After SIGKILL the children notice
+    # at the next iteration or row that their parent has ended.
+    while number == signal.SIGKILL and processes_in(tmp_path):
+        assert time.monotonic() < end + PATIENCE, "a run goes on without its parent"
+        time.sleep(0.02)
     assert processes_in(tmp_path) == []
     for load in ("1000.0", "2000.0"):
         assert (tmp_path / f"phase1.pressure={load}.checkpoint.h5").exists()
@@ -371,6 +377,48 @@ def test_a_stopped_sweep_leaves_checkpoints_and_continues(tmp_path, number):
         subprocess.run([asperity.runs.program.program(), "run", "other.nml", "--output", first.name,
                         "--restart", "--quiet"], cwd=tmp_path, check=True, capture_output=True)
     assert rows_of(first) == len(before)
+
+
+def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program):
+    """Two sweeps of one folder at once: each case is run by one of them."""
+    case = sliding()
+    case.phase[2].steps = 300
+    parameters = {"phase[1].pressure": [1e3]}
+    name = sweep(case, parameters, folder=tmp_path / "name").paths[0].name
+    folder = tmp_path / "parts"
+    folder.mkdir()
+    case.write(folder / f"{Path(name).stem}.nml")
+    process = subprocess.Popen([program, "run", f"{Path(name).stem}.nml", "--quiet"], cwd=folder,
+                               stderr=subprocess.DEVNULL)
+    wait_for_rows(process, folder / name, 2)
+    table = sweep(case, parameters, folder=folder)
+    assert process.wait(PATIENCE) == 0
+    assert table.failed == [] and table.runs[0].finished
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux")
+def test_a_restart_that_cannot_write_keeps_the_checkpoint(tmp_path, program):
+    """Only a checkpoint that cannot be used leads to a run from the beginning."""
+    case = sliding()
+    case.phase[2].steps = 600
+    job = tmp_path / sweep(case, {"phase[1].pressure": [1e3]}, folder=tmp_path / "n").paths[0].name
+    case.write(job.with_suffix(".nml"))
+    process = subprocess.Popen([program, "run", job.with_suffix(".nml").name, "--quiet"],
+                               cwd=tmp_path, stderr=subprocess.DEVNULL)
+    wait_for_rows(process, job, 5, signal.SIGINT)
+    process.wait(PATIENCE)
+    checkpoint = tmp_path / f"{job.stem}.checkpoint.h5"
+    kept = checkpoint.read_bytes()
+    full = tmp_path / "full"
+    full.write_text("#!/bin/sh\nulimit -f 1\nexec '" + program + "' \"$@\"\n")
+    full.chmod(0o755)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ASPERITY_PROGRAM", str(full))
+        asperity.runs.program.program.cache_clear()
+        table = sweep(case, {"phase[1].pressure": [1e3]}, folder=tmp_path, errors="keep")
+    asperity.runs.program.program.cache_clear()
+    assert len(table.failed) == 1 and checkpoint.read_bytes() == kept
+    assert sweep(case, {"phase[1].pressure": [1e3]}, folder=tmp_path).runs[0].finished
 
 
 def test_a_stopped_case_continues_from_its_checkpoint(tmp_path, program):
@@ -424,7 +472,7 @@ def test_a_program_that_is_missing_or_dies(tmp_path, monkeypatch):
         asperity.runs.program.program.cache_clear()
         table = sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path / "b", errors="keep")
         assert table.failed[0].message == "killed by signal 9"
-        assert table.rows == 1 and table.results == ()
+        assert table.rows == 1 and np.isnan(table["friction"]).all()
     finally:
         monkeypatch.undo()
         asperity.runs.program.program.cache_clear()

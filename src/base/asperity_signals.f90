@@ -4,14 +4,18 @@
 !> near) ask a run to stop after the present step, or within it if it takes long. SIGUSR1 requests a
 !> checkpoint. SIGXFSZ (a file would exceed the size limit) and SIGPIPE (nobody reads the messages any
 !> more, as after `2>&1 | head`) are ignored, so that the write that caused them fails with an error.
+!>
+!> A program that starts many runs may be killed. Its runs would go on alone, and the next call of the program
+!> would find their results in use. It therefore gives its process number to a run (`ASPERITY_PARENT`), which
+!> stops, as after SIGTERM, when its parent is another process.
 module asperity_signals
    use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, &
       c_null_ptr, c_ptr
    implicit none
    private
 
-   public :: catch_signals, catch_stops, checkpoint_asked, forget_checkpoint, give_back_stops, on_linux, &
-      stop_signal, stop_signal_name, stop_was_asked
+   public :: catch_signals, catch_stops, checkpoint_asked, end_with_parent, forget_checkpoint, give_back_stops, &
+      on_linux, stop_signal, stop_signal_name, stop_was_asked
 
    integer(c_int), parameter :: signal_hang_up = 1        !! SIGHUP
    integer(c_int), parameter :: signal_interrupt = 2      !! SIGINT
@@ -29,6 +33,7 @@ module asperity_signals
 
    integer(c_int64_t), target :: actions(action_length, most_stops) = 0   !! the host's own actions, during a call
    integer(c_int), volatile :: caught = 0
+   integer(c_int) :: parent = 0                           !! process with which the run ends; 0: none
    logical, volatile :: asked = .false.
 
    interface
@@ -51,6 +56,11 @@ module asperity_signals
          type(c_ptr), value :: before            !! null: the former action is not needed
          integer(c_int) :: status
       end function c_sigaction
+
+      function c_getppid() bind(c, name='getppid') result(number)
+         import :: c_int
+         integer(c_int) :: number
+      end function c_getppid
    end interface
 
 contains
@@ -70,6 +80,22 @@ contains
       before = c_signal(signal_file_size, ignore)
       before = c_signal(signal_pipe, ignore)
    end subroutine catch_signals
+
+   !> Stop the run when the process that started it has ended, if that process has given its number.
+   subroutine end_with_parent()
+      character(16) :: text
+      integer :: status
+
+      call get_environment_variable('ASPERITY_PARENT', text, status=status)
+      if (status == 0) read (text, *, iostat=status) parent
+      if (status /= 0) parent = 0
+   end subroutine end_with_parent
+
+   !> If the parent has ended, behave as after SIGTERM.
+   subroutine look_for_parent()
+      if (parent <= 0 .or. caught /= 0) return
+      if (c_getppid() /= parent) caught = signal_terminate
+   end subroutine look_for_parent
 
    !> Is this Linux? The numbers of some signals depend on the system.
    logical function on_linux()
@@ -109,6 +135,7 @@ contains
    function stop_signal() result(number)
       integer :: number
 
+      call look_for_parent()
       number = caught
    end function stop_signal
 
@@ -116,6 +143,7 @@ contains
    function stop_was_asked() bind(c) result(yes)
       integer(c_int) :: yes
 
+      call look_for_parent()
       yes = merge(1_c_int, 0_c_int, caught /= 0)
    end function stop_was_asked
 

@@ -24,13 +24,18 @@ from . import namelists
 from .case import Case
 from .progress import Progress
 
-__all__ = ["Job", "Stops", "found_result", "is_done", "run_here", "text_of", "write_input"]
+__all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result", "is_done",
+           "run_here", "text_of", "write_input"]
 
 _map_checksum = call("map_checksum")
 
 _POLL = 0.02            # time between two checks of the processes, s
 _ECHO = 0.3             # two signals within this time, s, count as one (to us and to our group)
 _PATIENCE = 60.0        # time that a stopped process has for its checkpoint, s
+_PAUSE = 1.0            # before a case that another process is running is looked at again, s
+# Words of the program about a file from which it cannot continue, with status 3. Other causes of
+# this status, such as a full disk, leave the checkpoint as it is for the next call.
+UNSUITABLE = ("damaged", "no checkpoint", "nothing to continue", "not an HDF5 file")
 
 
 @dataclass
@@ -47,6 +52,7 @@ class Job:
     output: IO[bytes] | None = None
     restarted: bool = False
     started: float = 0.0
+    due: float = 0.0                                # when to look again at a case in use
 
 
 def is_done(job: Job) -> bool:
@@ -102,6 +108,29 @@ def write_input(job: Job) -> Path:
     return path
 
 
+def begins_again(status: int, message: str) -> bool:
+    """Return whether a case has to be run from its beginning, because a restart was not possible.
+
+    Parameters
+    ----------
+    status : int
+        Exit status of the restart.
+    message : str
+        What it printed.
+
+    Returns
+    -------
+    bool
+        Whether there is no checkpoint, or none from which the case can continue.
+    """
+    return status == 2 or (status == 3 and any(words in message for words in UNSUITABLE))
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of a run that stops with a checkpoint when this process has ended."""
+    return {**os.environ, "ASPERITY_PARENT": str(os.getpid())}
+
+
 def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, resume: bool,
              progress: Progress) -> None:
     """Run jobs, several at a time. If this function ends early, it stops the running processes.
@@ -119,40 +148,59 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
     progress : Progress
         The display of the progress.
     """
-    queue = list(reversed(waiting))
+    queue = list(waiting)
     running: list[Job] = []
+
+    def count(job: Job) -> None:
+        progress.done(job.name, job.message if job.status else None,
+                      time.monotonic() - job.started, len(running))
+
     with Stops() as stops:
         try:
             while (queue or running) and not stops.asked:
-                while queue and len(running) < side_by_side and not stops.asked:
-                    job = queue.pop()
-                    running.append(job)
-                    _start(job, command, threads, restart=resume and found_result(job) is not None)
-                    progress.show(len(running))
+                ready = [job for job in queue if job.due <= time.monotonic()]
+                for job in ready[:side_by_side - len(running)]:
+                    queue.remove(job)
+                    if job.due and resume and is_done(job):  # by the process that used it
+                        job.status, job.message = 0, ""
+                        count(job)
+                    elif not stops.asked:
+                        running.append(job)
+                        _start(job, command, threads, resume and found_result(job) is not None)
+                        progress.show(len(running))
                 for job in list(running):
                     assert job.process is not None
                     if job.process.poll() is None:
                         continue
                     if _finish(job):
                         _start(job, command, threads, restart=False)
+                        continue
+                    running.remove(job)
+                    if _is_used(job):
+                        if not job.due:
+                            progress.note(f"{job.name} waits for another process that runs it")
+                        job.due = time.monotonic() + _PAUSE
+                        queue.append(job)
                     else:
-                        running.remove(job)
-                        progress.done(job.name, job.message if job.status else None,
-                                      time.monotonic() - job.started, len(running))
-                time.sleep(_POLL if running else 0.0)
+                        count(job)
+                time.sleep(_POLL if running or queue else 0.0)
         finally:
             progress.end()
             _stop(running, stops)
 
 
+_ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
 class Stops:
-    """Collects SIGINT and SIGTERM, so that they cannot interrupt a call halfway.
+    """Collects SIGINT, SIGTERM and SIGHUP, so that they cannot interrupt a call halfway.
 
     A signal handler that raises an exception may do so between any two instructions. If this
     happens while a process is being started, the process continues without our knowledge; if it
     happens while subprocess holds its lock, the lock is never released. Here the signals are only
     recorded. At the end they have their usual effect: SIGINT raises KeyboardInterrupt or calls the
-    handler that was set before, and SIGTERM ends the process with status 143.
+    handler that was set before, SIGTERM ends the process with status 143, and SIGHUP (the terminal
+    was closed) with status 129.
     """
 
     def __init__(self) -> None:
@@ -162,7 +210,7 @@ class Stops:
 
     def __enter__(self) -> Stops:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in (signal.SIGINT, *_ENDING):
                 # A signal that was ignored when we started, as in the background of a shell, stays
                 # ignored.
                 if signal.getsignal(number) != signal.SIG_IGN:
@@ -181,9 +229,10 @@ class Stops:
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
         if not self.asked:
             return
-        if self.asked[0] == signal.SIGTERM and self._before[signal.SIGTERM] == signal.SIG_DFL:
-            raise SystemExit(128 + signal.SIGTERM)
-        signal.raise_signal(self.asked[0])
+        first = self.asked[0]
+        if first in _ENDING and self._before[first] == signal.SIG_DFL:
+            raise SystemExit(128 + first)
+        signal.raise_signal(first)
 
 
 def _start(job: Job, command: str, threads: int, restart: bool) -> None:
@@ -197,7 +246,7 @@ def _start(job: Job, command: str, threads: int, restart: bool) -> None:
              "--quiet", "--restart" if restart else "--overwrite"]
     job.process = subprocess.Popen(words, cwd=path.parent, stdin=subprocess.DEVNULL,
                                    stdout=subprocess.DEVNULL, stderr=job.output,
-                                   start_new_session=True)
+                                   start_new_session=True, env=environment())
 
 
 def _finish(job: Job) -> bool:
@@ -207,8 +256,8 @@ def _finish(job: Job) -> bool:
     printed = job.output.read().decode(errors="replace").strip()
     job.output.close()
     status = job.process.returncode
-    if job.restarted and status in (2, 3):
-        return True  # there is no suitable checkpoint: start from the beginning
+    if job.restarted and begins_again(status, printed):
+        return True
     job.status = status
     if status:
         reason = printed or f"the program ended with status {status}"
@@ -216,6 +265,11 @@ def _finish(job: Job) -> bool:
     elif printed:
         job.message = printed
     return False
+
+
+def _is_used(job: Job) -> bool:
+    """Return whether another process is writing the result of a case."""
+    return job.status == 3 and "is in use by" in job.message
 
 
 def _stop(running: list[Job], stops: Stops) -> None:

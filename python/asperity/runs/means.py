@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import hashlib
 import json
 import os
 import shlex
@@ -15,7 +16,16 @@ from typing import NamedTuple
 
 from ..base.check import shown, whole
 from ..base.files import write_text
-from .jobs import Job, Stops, found_result, run_here, write_input
+from .jobs import (
+    UNSUITABLE,
+    Job,
+    Stops,
+    begins_again,
+    environment,
+    found_result,
+    run_here,
+    write_input,
+)
 from .program import program
 from .progress import Progress
 
@@ -145,10 +155,12 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
              "--quiet"]
     for more in ["--restart", "--overwrite"] if restart else ["--overwrite"]:
         done = subprocess.run([*words, more], cwd=file.parent, stdin=subprocess.DEVNULL,
-                              capture_output=True, start_new_session=True, check=False)
-        if done.returncode not in (2, 3):
+                              capture_output=True, start_new_session=True, env=environment(),
+                              check=False)
+        printed = done.stderr.decode(errors="replace").strip()
+        if not begins_again(done.returncode, printed):
             break
-    return done.returncode, done.stderr.decode(errors="replace").strip()
+    return done.returncode, printed
 
 
 def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> None:
@@ -194,13 +206,24 @@ _SCRIPT = """#!/bin/sh
 # This task runs one case of the list in {names}: the number of the task is its line, from 0.
 cd {folder} || exit 1
 name=$(sed -n "$((SLURM_ARRAY_TASK_ID + 1))p" {names})
-if [ -f "$name.h5" ]; then
-  {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --restart
-  status=$?
-  # With status 2 or 3 there is no suitable checkpoint, and the case is run from its beginning.
-  [ $status = 2 ] || [ $status = 3 ] || exit $status
+run() {{ {program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet "$@"; }}
+
+# A task that is started again after its case was completed has nothing to do.
+if [ "$name.h5" -nt "$name.nml" ] && {program} info "$name.h5" | grep -q '^finished *yes'; then
+  exit 0
 fi
-{program} run "$name.nml" --output "$name.h5" --threads {threads} --quiet --overwrite
+if [ -f "$name.h5" ]; then
+  said=$(run --restart 2>&1)
+  status=$?
+  [ -z "$said" ] || printf '%s\\n' "$said" >&2
+  # Without a suitable checkpoint the case is run from its beginning. After any other failure, such
+  # as a full disk, the checkpoint stays as it is.
+  case $status:$said in
+    2:* | {unsuitable}) ;;
+    *) exit $status ;;
+  esac
+fi
+run --overwrite
 """
 
 
@@ -237,11 +260,15 @@ def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
                                 " Slurm")
     for job in waiting:
         write_input(job)
-    write_text(folder / "waiting.txt", "".join(f"{job.name}\n" for job in waiting))
+    # Each array has its own list, because an earlier array may still be reading its own.
+    listed = "".join(f"{job.name}\n" for job in waiting)
+    names = f"waiting-{hashlib.sha256(listed.encode()).hexdigest()[:8]}.txt"
+    write_text(folder / names, listed)
     script = folder / "job.sh"
     write_text(script, _SCRIPT.format(
-        names="waiting.txt", folder=shlex.quote(str(folder.resolve())), threads=threads,
-        program=shlex.quote(program())))
+        names=names, folder=shlex.quote(str(folder.resolve())), threads=threads,
+        program=shlex.quote(program()),
+        unsuitable=" | ".join(f'3:*"{words}"*' for words in UNSUITABLE)))
     words = [command, "--parsable", f"--array=0-{len(waiting) - 1}", f"--cpus-per-task={threads}",
              f"--chdir={folder.resolve()}", *shlex.split(options), str(script.resolve())]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

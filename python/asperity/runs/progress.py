@@ -42,6 +42,11 @@ class Progress:
         self._stream.write(text + "\n")
         self._stream.flush()
 
+    def note(self, text: str) -> None:
+        """Write a remark in a line of its own."""
+        if not self._quiet:
+            self._line(f"{self._what}: {text}")
+
     def show(self, running: int) -> None:
         """Rewrite the line of a terminal."""
         if self._quiet or not self._terminal:

@@ -19,6 +19,7 @@ import numpy as np
 from ..base.check import choice, shown
 from ..base.files import make_folder, write_text
 from ..results import Run, open_result
+from ..results.column_types import HistoryColumns
 from ..results.steady import steady_mean
 from . import namelists
 from .case import Case
@@ -355,11 +356,25 @@ def _table(work: list[Job], shape: tuple[int, ...],
         warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
     parameters = list(work[0].values)
     columns = {name: column([job.values[name] for job in work]) for name in parameters}
-    for name in dict.fromkeys(name for row in found if row is not None for name in row):
+    results = dict.fromkeys(name for row in found if row is not None for name in row)
+    if len(failed) == len(work) and measure is None:
+        results = dict.fromkeys(_columns_of_failed(work))
+    for name in results:
         if name in columns:
             raise ValueError(f"measure: {name} is the name of a parameter")
         columns[name] = column([None if row is None else row.get(name) for row in found])
     return Sweep(columns, parameters, shape, [job.path for job in work], failed, units)
+
+
+def _columns_of_failed(work: list[Job]) -> list[str]:
+    """Return the columns that the table of a sweep has even if all its cases failed.
+
+    They are those of the first result that was begun, or if there is none, of all histories.
+    """
+    for job in work:
+        with contextlib.suppress(OSError):
+            return list(open_result(job.path).history)
+    return list(HistoryColumns.__annotations__)
 
 
 def _units_of(parameter: str) -> str:
@@ -396,7 +411,12 @@ def _measured(measure: Callable[[Run], Mapping[str, Any]] | str, run: Run) -> di
     if isinstance(measure, str):
         choice("measure", measure, ("steady",))
         return _steady(run)
-    values = measure(run)
+    try:
+        values = measure(run)
+    except Exception as error:
+        if hasattr(error, "add_note"):  # from Python 3.11 on
+            error.add_note(f"measure: was called for {run.path}")
+        raise
     if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
         raise ValueError(f"measure: returned {values!r} for {run.path.name}: must return a dict"
                          " with a value for each name, such as {'friction': 0.5}")
