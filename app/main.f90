@@ -181,6 +181,7 @@ contains
       integer :: signal
 
       call limit%start(command%time_limit)
+      if (allocated(limit%remark) .and. is_first_process()) call say_error(limit%remark)
       call run%open(case, command%restart, command%overwrite, error)
       if (.not. allocated(error)) then
          run%sim%stop%asked => must_stop

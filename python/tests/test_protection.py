@@ -254,6 +254,13 @@ def test_time_limit(program: str, tmp_path: Path) -> None:
     assert vc.count(result) > rows
 
 
+def test_a_time_limit_of_slurm_that_is_no_number_is_noted(program: str, case: Path) -> None:
+    case.write_text(vc.text(size=24))
+    done = vc.run(program, case, env=dict(os.environ, SLURM_JOB_END_TIME="abc"))
+    assert done.returncode == 0
+    assert "SLURM_JOB_END_TIME = abc: must be a number of seconds" in done.stderr
+
+
 @pytest.mark.parametrize("text", ["", "x", "1:2:3:4", "0", "-1", "1-", "1.5", ":", "99999999999"])
 def test_time_limit_is_checked(program: str, case: Path, text: str) -> None:
     """A text that is not a duration is an error in the command line."""

@@ -224,6 +224,11 @@ def test_result_of_another_run(program: str, tmp_path: Path) -> None:
     assert done.returncode == 2, done.stderr
     assert "case.h5: is not the result that" in done.stderr
     assert (case.with_suffix(".h5").read_bytes() == other.with_suffix(".h5").read_bytes())
+    case.with_suffix(".h5").write_bytes(b"")
+    done = vc.run(program, case, "--restart")
+    assert done.returncode == 3, done.stderr
+    assert "case.h5: is empty: --overwrite starts" in done.stderr
+    assert case.with_suffix(".h5").read_bytes() == b""
     shutil.copy(tmp_path / "kept.h5", case.with_suffix(".h5"))
     assert vc.run(program, case, "--restart").returncode == 0
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import re
 import signal
 import subprocess
@@ -377,6 +378,33 @@ def test_a_stopped_sweep_leaves_checkpoints_and_continues(tmp_path, number):
         subprocess.run([asperity.runs.program.program(), "run", "other.nml", "--output", first.name,
                         "--restart", "--quiet"], cwd=tmp_path, check=True, capture_output=True)
     assert rows_of(first) == len(before)
+
+
+def test_the_script_of_a_job_array(tmp_path, monkeypatch):
+    """A task that is started again keeps a complete result, and continues from a checkpoint."""
+    sbatch = tmp_path / "sbatch"
+    sbatch.write_text("#!/bin/sh\necho 7\n")
+    sbatch.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    folder = tmp_path / "array"
+    waiting = sweep(sliding(), {"phase[1].pressure": [1e3, 2e3]}, folder=folder, errors="keep",
+                    slurm="--time=1")
+    assert len(waiting.failed) == 2 and "submitted to Slurm" in waiting.failed[0].message
+
+    def task(number):
+        return subprocess.run(["sh", folder / "job.sh"], capture_output=True, text=True,
+                              env=dict(os.environ, SLURM_ARRAY_TASK_ID=str(number)))
+
+    for number, result in enumerate(waiting.paths):
+        assert task(number).returncode == 0
+        whole = result.read_bytes()
+        assert task(number).returncode == 0 and result.read_bytes() == whole
+        # A damaged result without a checkpoint is computed again.
+        result.write_bytes(whole[:3000])
+        done = task(number)
+        assert done.returncode == 0, done.stderr
+    table = sweep(sliding(), {"phase[1].pressure": [1e3, 2e3]}, folder=folder)
+    assert all(run.finished for run in table.runs)
 
 
 def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program):

@@ -8,10 +8,11 @@
 !> fault and later calls do nothing. `report`, `end_snapshot`, `append_row`, `finish` and `close`
 !> return that fault (see `hdf5_handle`).
 module result_file
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_file, error_input, error_type, fail
    use asperity_precision, only : dp, int8
    use checkpoint_link, only : add_link, remove_link
-   use file_system, only : remove_file, rename_file
+   use file_kind, only : file_start
+   use file_system, only : file_exists, remove_file, rename_file
    use hdf5_chunk_writer, only : chunk_writer_type
    use hdf5_file, only : hdf5_file_type
    use hdf5_slabs, only : slab_rows
@@ -359,6 +360,10 @@ contains
       self%path = trim(path)
       self%compression = compression
       self%xdmf_path = sibling_path(path, '.xdmf')
+      if (file_exists(self%path) .and. file_start(self%path, 1) == '') then
+         call fail(error, error_file, self%path//': is empty: --overwrite starts the run again')
+         return
+      end if
       call self%file%open(self%path, 'append')
       call self%read_text('id', self%id)
       call self%report(error)

@@ -16,6 +16,7 @@ module time_limit
    !> The limit of a run.
    type :: time_limit_type
       logical :: limited = .false.
+      character(:), allocatable :: remark        !! why the limit of Slurm does not hold, if so
       real(dp), private :: finish = 0.0_dp       !! on the clock of `seconds_now`, s
       real(dp), private :: margin = 0.0_dp       !! s
       real(dp), private :: longest_step = 0.0_dp !! s
@@ -51,7 +52,10 @@ contains
       left = seconds
       if (left < 0.0_dp) then
          call get_environment_variable('SLURM_JOB_END_TIME', text, status=status)
-         if (status == 0) read (text, *, iostat=status) finish
+         if (status /= 0) return
+         read (text, *, iostat=status) finish
+         if (status /= 0) self%remark = 'SLURM_JOB_END_TIME = '//trim(text)//': must be a number of seconds: '// &
+            'without it the run has no time limit (--time-limit gives one)'
          if (status /= 0) return
          left = real(finish - c_time(0_c_long), dp)
       end if

@@ -35,7 +35,7 @@ _PATIENCE = 60.0        # time that a stopped process has for its checkpoint, s
 _PAUSE = 1.0            # before a case that another process is running is looked at again, s
 # Words of the program about a file from which it cannot continue, with status 3. Other causes of
 # this status, such as a full disk, leave the checkpoint as it is for the next call.
-UNSUITABLE = ("damaged", "no checkpoint", "nothing to continue", "not an HDF5 file")
+UNSUITABLE = ("damaged", "is empty", "no checkpoint", "nothing to continue", "not an HDF5 file")
 
 
 @dataclass
