@@ -396,6 +396,8 @@ contains
       call refuse(body//'&solver tolerance = 1e-6', 'is not closed: a ''/'' is missing before the end')
       call refuse('&solver tolerance = 1e-6'//nl//body, 'missing before the next group in line 2')
       call refuse('nx = 4'//nl//body, 'line 1: text outside of a group: nx = 4')
+      call refuse('&case title'//char(194)//char(160)//'= ''a'' /'//nl//body, 'there is no such variable: it contains a '// &
+         'character that is not ASCII')
       call refuse(body//'&case title = ''open /'//nl, 'has a string that is not closed on its line')
       call refuse(body//'&solver 1e-6 /', '1e-6 in line 5 is not an assignment')
       call refuse(body//achar(0), 'line 5: a character that is not text (code 0)')

@@ -76,6 +76,8 @@ contains
       call broken('&a = 1, y = 2 /', 1, '= 1 in line 1 is not an assignment')
       call broken('&a x = (1,2', 1, 'is not closed')
       call broken('& a x = 1 /', 1, 'text outside of a group')
+      call broken('&a x = 1/1000 /', 1, 'f: line 1: text outside of a group: 1000 /: a group is &name ... /; the slash '// &
+         'before this text ends its group')
       call broken('&a /'//achar(27), 1, 'code 27')
       call broken(repeat('x', 100000), 1, '...: a group is &name')
       call broken(repeat('&a x'//nl, 500), 100, 'there are more faults')

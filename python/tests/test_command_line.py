@@ -433,6 +433,11 @@ def test_info_of_other_files(program, tmp_path):
     done = call(program, "info", other)
     assert done.returncode == 3
     assert "is neither a result nor a height map" in done.err
+    with h5py.File(other, "a") as file:
+        file.attrs["result_id"] = "x"
+    done = call(program, "info", other)
+    assert done.returncode == 3
+    assert "is a checkpoint: `asperity run` with --restart continues" in done.err
 
 
 # Hypothesis makes these inputs. The program may accept one that is right; it must never crash.

@@ -454,6 +454,13 @@ def test_units(tmp_path, unit, metres):
     assert surface.unit == unit.replace("µ", "u")
 
 
+def test_lengths_of_own_files_are_exact(tmp_path):
+    """Other files sum their lengths over cells, which leaves rounding errors."""
+    asperity.surface.save(tmp_path / "map.h5", sample(), 1e-3 / 3, 2e-3 / 7)
+    found = load(tmp_path / "map.h5", level="none")
+    assert (found.lx, found.ly) == (1e-3 / 3, 2e-3 / 7)
+
+
 def test_unit_and_size_that_a_file_lacks(tmp_path):
     path = tmp_path / "map.npy"
     np.save(path, sample().T)

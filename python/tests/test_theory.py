@@ -631,6 +631,18 @@ def test_speed_step_joins_the_steady_states():
     assert found.friction[2] == pytest.approx(float(finer.friction[0]), rel=1e-6)
 
 
+def test_displacement_far_from_a_line_contact():
+    """The displacement is the difference of a gap and a parabola that grow much faster."""
+    line = theory.hertz_line(1.0, 1e6, half_width=1e-4)
+    for t in (1.0, 3.0, 1e4, 1e8, 1e12):
+        # The derivative is that of -(a/R) (t - sqrt(t^2 - 1)): integrate in log t from 1.
+        part = quad(lambda s: math.exp(s) / (math.exp(s) + math.sqrt(math.expm1(2.0 * s))),
+                    0.0, math.log(t), limit=200)[0]
+        expected = -(1e-4**2) * (0.5 + part)
+        assert float(line.displacement(1e-4 * t)) == pytest.approx(expected, rel=1e-9)
+    assert float(line.displacement(5e-5)) == pytest.approx(-0.5 * 5e-5**2, rel=1e-14)
+
+
 def summed_speed_step(k, psd, rubber, p, before, after, t, gamma):
     """Return area and friction after a change of speed, by sums over wave numbers and angles.
 
@@ -739,6 +751,8 @@ def test_spectrum_of_a_given_surface(generator):
     expected = theory.persson_area(2e5, 4 * WIDE.g_inf, known.rms_slope)
     assert float(at_rest.contact_area) == pytest.approx(float(expected), rel=1e-6)
     # bands of another width, the rings as they are, and the spectrum that it was made of
+    narrow = theory.psd_moments(*theory.surface_psd(height, lx, ly, bands_per_decade=200))
+    np.testing.assert_allclose(narrow, (known.rms_height, known.rms_slope), rtol=1e-6)
     fine = theory.surface_psd(height, lx, ly, bands_per_decade=40)
     rings = asperity.surface.psd(height, lx, ly)
     target = theory.self_affine_psd(0.7, 2.5e-4, 2.5e-4, 4e-5, rms_slope=0.3)

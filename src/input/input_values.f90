@@ -126,7 +126,7 @@ contains
             names(i) = group%values(i)%entry%name
          end do
          call faults%add('&'//trim(group%name)//': '//trim(assignment%name), 'there is no such variable'// &
-            hint('', nearest_name(assignment%name, names))//in_line(assignment%line))
+            advice_on_name(assignment%name, names)//in_line(assignment%line))
          return
       end if
 
@@ -329,6 +329,19 @@ contains
          end associate
       end do
    end subroutine finish_group
+
+   !> What may be wrong with a name that is not known. A non-breaking space, for example, cannot be seen.
+   function advice_on_name(name, names) result(text)
+      character(*), intent(in) :: name, names(:)
+      character(:), allocatable :: text
+      integer :: i
+
+      if (any([(ichar(name(i:i)) > 126, i=1, len(name))])) then
+         text = ': it contains a character that is not ASCII, such as a non-breaking space'
+      else
+         text = hint('', nearest_name(name, names))
+      end if
+   end function advice_on_name
 
    !> The proposal of a similar name, if there is one.
    pure function hint(prefix, name) result(text)

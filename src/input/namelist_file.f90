@@ -118,7 +118,7 @@ contains
                   at = at + 1
                end do
                call faults%add('line '//to_text(token%line), 'text outside of a group: '// &
-                  shown_tokens(file, first, at)//': a group is &name ... /')
+                  shown_tokens(file, first, at)//': a group is &name ... /'//about_slash())
                at = at + 1
             else if (token%kind == token_close) then
                inside = .false.
@@ -134,6 +134,16 @@ contains
       file%assignments = assignments(:count)
 
    contains
+
+      !> If a slash just before the text has ended a group, it may have been meant as a division.
+      function about_slash() result(text)
+         character(:), allocatable :: text
+
+         text = ''
+         if (first == 1) return
+         if (file%tokens(first - 1)%kind == token_close .and. file%tokens(first - 1)%line == file%tokens(first)%line) &
+            text = '; the slash before this text ends its group, since values cannot be expressions'
+      end function about_slash
 
       !> Report that the present group has no end.
       subroutine unclosed(line)

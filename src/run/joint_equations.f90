@@ -120,12 +120,15 @@ contains
       class(contact_type), intent(inout) :: contact
       logical, intent(out) :: done
       real(dp), allocatable :: load(:, :), u(:, :), traction(:, :, :), shear(:, :, :)
-      integer :: c, k, nx, ny, status
+      integer :: c, k, nx, ny, status(4)
 
       nx = self%grid%nx
       ny = self%grid%rows()
-      allocate (load(nx, ny), u(nx, ny), traction(nx, ny, 2), shear(nx, ny, 2), source=0.0_dp, stat=status)
-      done = .not. any_process(status /= 0)
+      allocate (load(nx, ny), source=0.0_dp, stat=status(1))
+      allocate (u(nx, ny), source=0.0_dp, stat=status(2))
+      allocate (traction(nx, ny, 2), source=0.0_dp, stat=status(3))
+      allocate (shear(nx, ny, 2), source=0.0_dp, stat=status(4))
+      done = .not. any_process(any(status /= 0))
       if (.not. done) return
       if (self%grid%first_row == 1 .and. ny > 0) load(1, 1) = 1.0_dp
       call self%operator%apply(load, u)

@@ -59,6 +59,8 @@ contains
          call describe_map(file, path, '/surface/height', text, error)
       else if (file%has_dataset('/surface')) then
          call describe_map(file, path, '/surface', text, error)
+      else if (file%has_attribute('/', 'result_id')) then
+         call fail(error, error_file, path//': is a checkpoint: `asperity run` with --restart continues its result')
       else
          call fail(error, error_file, path//': is neither a result nor a height map: it has no attribute ''finished'''// &
             ' and no dataset surface/height or surface')

@@ -202,7 +202,8 @@ def new_file(path: Path) -> Iterator[Path]:
             new.replace(target)
     except OSError as error:
         # What is written may itself be given its name by this function.
-        reason = error.strerror or str(error).removeprefix(f"{new}: cannot be written: ")
+        reason = error.strerror or str(error).removeprefix(f"{new}: ").removeprefix(
+            "cannot be written: ")
         raise OSError(f"{path}: cannot be written: {reason}") from None
     finally:
         if temporary:

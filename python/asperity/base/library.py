@@ -190,7 +190,7 @@ def contact_map(height: ArrayLike, lx: float, ly: float | None, boundary: str
 
 def check_depth(displacement: float, array: NDArray[np.float64]) -> None:
     """Refuse a displacement that brings a periodic map into full contact."""
-    deepest = float(array.max()) - float(array.mean())
+    deepest = max(float(array.max()) - float(array.mean()), 0.0)
     if displacement >= deepest:
         raise ValueError(
             f"displacement = {displacement}: must be below {deepest:g} m, the mean gap at first"

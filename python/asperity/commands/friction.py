@@ -221,10 +221,13 @@ def _friction(chosen: argparse.Namespace) -> int:
     except SubmittedError as message:
         print(message)
         return 0
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as stop:
         again = " without --no-resume" if chosen.no_resume else ""
-        raise KeyboardInterrupt(
-            f"the same command{again} goes on with what is in {folder}") from None
+        way_on = f"the same command{again} goes on with what is in {folder}"
+        if isinstance(stop, KeyboardInterrupt):
+            raise KeyboardInterrupt(way_on) from None
+        print(f"asperity: stopped by a signal: {way_on}", file=sys.stderr)
+        raise
     print(curve.summary(plan.all_notes))
     for output in outputs:
         write_output(output, folder, code, lambda name: _write(curve, name))

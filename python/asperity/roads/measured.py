@@ -287,8 +287,10 @@ def load(
     if unit != "m":
         work.note("unit", unit=unit, metres=UNITS[unit])
     height = np.ascontiguousarray(to_metres(work.height, unit))
-    # Lengths that a file sums over cells contain rounding errors: twelve digits are significant.
-    lx, ly = (float(f"{to_metres(length, unit):.12g}") for length in work.sizes)
+    lx, ly = (to_metres(length, unit) for length in work.sizes)
+    if source["format"] != "asperity":
+        # Lengths that a file sums over cells contain rounding errors: keep twelve digits.
+        lx, ly = (float(f"{length:.12g}") for length in (lx, ly))
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
                            [*_jump_note(jump, level, unit, work.periodic), *_advice(work, level),
                             *_outlier_note(height)])

@@ -112,6 +112,8 @@ def psd(height: ArrayLike, lx: float, ly: float | None = None) -> RadialPsd:
 def psd_map(height: ArrayLike, lx: float, ly: float | None = None) -> FloatArray:
     """Return the power spectral density of all modes, in the order of `numpy.fft.fftfreq`.
 
+    The first mode contains the mean height, which is not subtracted.
+
     Parameters
     ----------
     height : array_like

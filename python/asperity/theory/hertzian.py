@@ -222,7 +222,12 @@ class HertzLine:
         ValueError
             If a position is not a finite number.
         """
-        return self.gap(x) - 0.5 * array_of("x", x) ** 2 / self.radius
+        t = np.abs(array_of("x", x)) / self.half_width
+        outer = np.maximum(t, 1.0)
+        root = np.sqrt((outer - 1.0) * (outer + 1.0))
+        # Far away this is accurate, unlike the difference of the gap and the cylinder.
+        depth = np.where(t < 1.0, t * t, outer / (outer + root) + np.arccosh(outer))
+        return np.asarray(-(self.half_width**2) / (2.0 * self.radius) * depth)
 
     def gap(self, x: ArrayLike) -> FloatArray:
         """Return the gap between cylinder and half-space, m; it is 0 within the contact.

@@ -183,15 +183,16 @@ def _power_integral(power: float, width: float) -> float:
 
 
 def _band_exponent(ratio: float, width: float) -> float:
-    """Return a, |a| <= 60, with int x^(a+3) dx = ratio int x^(a+1) dx over 1..width."""
+    """Return a with int x^(a+3) dx = ratio int x^(a+1) dx over 1..width, as far as |a| allows."""
     span = math.log(width)
+    most = max(60.0, 30.0 / span)
 
     def excess(a: float) -> float:
         return _power_integral(a + 4.0, span) / _power_integral(a + 2.0, span) - ratio
 
-    if excess(-60.0) >= 0.0:
-        return -60.0
-    return 60.0 if excess(60.0) <= 0.0 else float(brentq(excess, -60.0, 60.0, xtol=1e-13))
+    if excess(-most) >= 0.0:
+        return -most
+    return most if excess(most) <= 0.0 else float(brentq(excess, -most, most, xtol=1e-13))
 
 
 def persson_area(pressure: ArrayLike, modulus: float, rms_slope: float) -> FloatArray:
