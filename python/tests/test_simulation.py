@@ -303,6 +303,8 @@ def test_advance_after_the_last_row():
         assert "after row 0" in repr(sim) and "finished" in repr(sim)
     with pytest.raises(ValueError, match="closed"):
         sim.fields["pressure"]
+    with pytest.raises(ValueError, match="the simulation is closed"):
+        sim.advance()
     assert repr(sim) == "simulation that is closed"
 
 

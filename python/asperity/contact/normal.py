@@ -30,7 +30,8 @@ class NormalContact:
     pressure : ndarray
         Pressure, Pa; it is 0 out of contact.
     gap : ndarray
-        Gap between the surfaces, m; in contact it is 0 to the tolerance.
+        Gap between the surfaces, m; in contact it is 0 to the tolerance, and may be slightly
+        negative.
     displacement_z : ndarray
         Normal displacement of the surface of the solid, m.
     mean_pressure, force : float

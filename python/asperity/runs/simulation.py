@@ -213,6 +213,8 @@ class Simulation:
             If Ctrl-C interrupts the row. The simulation is then where it was before the row, or
             after it if the row was just complete: `row` is the last complete one.
         """
+        if not self._release.alive:
+            raise ValueError("the simulation is closed")
         if self.finished:
             raise ValueError("the simulation is finished: no row is left")
         try:

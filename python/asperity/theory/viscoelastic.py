@@ -119,12 +119,16 @@ def _force_history(
         function = force
 
         def called(t: FloatArray) -> FloatArray:
-            values = array_of("force", function(t), low=0.0)
+            values = array_of("force", function(t))
             if values.shape != t.shape:
                 raise ValueError(
                     f"force: returned shape {values.shape} for times of shape {t.shape}:"
                     " must be the same"
                 )
+            if (values < 0.0).any():
+                at = int(np.argmax(values.ravel() < 0.0))
+                raise ValueError(f"force: is {values.ravel()[at]:.6g} N at {t.ravel()[at]:.6g} s:"
+                                 " must be >= 0")
             return values
 
         return called, None
@@ -236,8 +240,8 @@ def _refuse_shrinking(t: FloatArray, radius_at: Callable[[FloatArray], FloatArra
     if fall.size:
         i = int(fall[0])
         raise ValueError(
-            f"force: the contact radius falls from {a[i]:.9g} m at {times[i]:g} s to"
-            f" {a[i + 1]:.9g} m at {times[i + 1]:g} s: must not fall"
+            f"force: the contact radius of {a[i]:.6g} m falls by {a[i] - a[i + 1]:.2g} m between"
+            f" {times[i]:.6g} and {times[i + 1]:.6g} s: must not fall"
         )
 
 
