@@ -346,6 +346,8 @@ def test_lee_radok_force_in_three_ways():
 def test_lee_radok_refuses_a_shrinking_contact():
     with pytest.raises(ValueError, match="must not fall"):
         theory.lee_radok(0.01, [0.05, 0.01], RUBBER, [0.0, 1e-3])
+    with pytest.raises(ValueError, match=r"^force: is -1 N at .* s: must be >= 0$"):
+        theory.lee_radok(0.01, lambda t: -np.ones_like(t), RUBBER, [0.0, 1e-3])
 
 
 # ---- viscoelastic cylinder --------------------------------------------------------------------

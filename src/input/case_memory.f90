@@ -1,4 +1,5 @@
-!> Estimates the memory of a run from the number of fields that the header of each module states.
+!> Estimates the memory of a run from the number of fields that the header of each module states, and the size of its
+!> result.
 !>
 !> The memory of some parts depends on the course of the run: the acceleration of passes, which keeps more
 !> steps if there are many passes, and that of steady sliding. For these parts measured values are used.
@@ -16,7 +17,7 @@ module case_memory
    implicit none
    private
 
-   public :: joint_memory, memory_needed
+   public :: joint_memory, memory_needed, most_snapshots, result_size
 
    !> Fields of a step that is solved all at once: the equations and four states; and the directions of GMRES, if
    !> all cells touch.
@@ -30,6 +31,8 @@ module case_memory
    real(dp), parameter :: path_fields = 31.0_dp
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
+
+   real(dp), parameter :: row_of_history = 400.0_dp   !! bytes
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
    real(dp), parameter :: chunk = 131072.0_dp         !! most values of a chunk of the result
@@ -92,6 +95,31 @@ contains
       if (steady .and. .not. rubs) fields = newton_fields + tile_fields + newton_directions
       bytes = 8.0_dp*fields*real(case%grid%nx, dp)*real(case%grid%ny, dp)
    end function joint_memory
+
+   !> Most snapshots of a run that is not stopped.
+   pure function most_snapshots(case) result(n)
+      type(case_type), intent(in) :: case
+      integer :: n
+      integer :: rows
+
+      rows = count_rows(case%phases)
+      n = size(case%output%snapshot_times) + 1
+      if (case%output%snapshot_every > 0) n = n + rows/case%output%snapshot_every
+      n = min(n, rows)
+   end function most_snapshots
+
+   !> Most bytes of the result before compression: the height, the snapshots and the history. A state of contact is a
+   !> byte, any other value of a field has eight.
+   pure function result_size(case) result(bytes)
+      type(case_type), intent(in) :: case
+      real(dp) :: bytes
+      integer :: fields, states
+
+      states = count(case%output%snapshot_fields == 'contact')
+      fields = size(case%output%snapshot_fields) - states
+      bytes = real(case%grid%nx, dp)*real(case%grid%ny, dp) &
+         *(8.0_dp + most_snapshots(case)*(8.0_dp*fields + states)) + row_of_history*count_rows(case%phases)
+   end function result_size
 
    !> Copies of the arms, and with friction of the displacements, before a row that is taken in parts, bytes. They are
    !> kept if they take no more than 64 MB (module row_stop).

@@ -4,7 +4,7 @@ module case_report
    use footprint_advice, only : footprint_note
    use case_settings, only : case_type, phase_settings_type
    use case_time, only : duration_text, seconds_needed
-   use case_memory, only : joint_memory, memory_needed
+   use case_memory, only : joint_memory, memory_needed, most_snapshots, result_size
    use memory_limits, only : memory_limit, memory_text
    use asperity_precision, only : dp
    use regular_grid, only : boundary_free
@@ -51,31 +51,26 @@ contains
       text = text//solver_text(case)
    end function resolved_input
 
-   !> The steps, the memory, the effect of adhesion and the warnings as comment lines.
+   !> The steps, the memory, the size of the result, the effect of adhesion and the warnings as comment lines.
    function case_summary(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
-      character(:), allocatable :: unit
       character(:), allocatable :: whose
-      real(dp) :: limit, memory
+      real(dp) :: limit
 
       limit = memory_limit(whose)
-      memory = memory_needed(case)/1.0e6_dp
-      unit = ' MB'
-      if (memory >= 1.0e3_dp) then
-         memory = memory/1.0e3_dp
-         unit = ' GB'
-      end if
       text = '! cells of '//to_text(case%grid%dx)//' m by '//to_text(case%grid%dy)//' m'//nl
       text = text//'! '//counted(size(case%phases), 'phase')//', '
       if (any(case%phases%steady)) text = text//counted(count(case%phases%steady), 'steady state')//', '
       text = text//counted(count(case%phases%static .and. .not. case%phases%steady), 'static solve')//', '// &
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
-      text = text//'! memory: about '//to_text(real(nint(memory*10.0_dp), dp)/10.0_dp)//unit//nl
+      text = text//'! memory: about '//memory_text(memory_needed(case))//nl
       text = text//joint_note(case)
       if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
          ': '//memory_text(limit)//nl
+      text = text//'! result: at most '//memory_text(result_size(case))//' with '// &
+         counted(most_snapshots(case), 'snapshot')//', before compression'//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'
       if (case%friction%law /= 'none' .and. case%friction%slope_effect) text = text//'; rows on steep roads may take '// &
          'ten times as long'

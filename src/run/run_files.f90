@@ -13,6 +13,7 @@ module run_files
    use asperity_precision, only : dp
    use asperity_simulation, only : simulation_type
    use case_identity, only : identity_of
+   use case_memory, only : most_snapshots
    use case_record, only : checksums_of_maps, map_lines, material_record
    use case_report, only : resolved_input
    use file_lock, only : file_lock_type
@@ -102,9 +103,7 @@ contains
          plan%settings = self%settings
          plan%material = material_record(case%material)
          plan%rows = rows
-         plan%snapshots = size(case%output%snapshot_times) + 1
-         if (case%output%snapshot_every > 0) &
-            plan%snapshots = plan%snapshots + rows/case%output%snapshot_every
+         plan%snapshots = most_snapshots(case)
          if (sim%has_steady) plan%losses = count(case%phases%steady)
          plan%compression = case%output%compression
 
