@@ -853,6 +853,8 @@ def test_a_material_of_another_type_is_named():
                  lambda: theory.full_contact_waves(1e-6, (1e4, 0.0), (0.1, 0.0), 3.0)):
         with pytest.raises(ValueError, match=r"^material = 3\.0: must be a Prony$"):
             call()
+    with pytest.raises(ValueError, match=r"^times: has no value, must have at least one$"):
+        theory.persson_speed_step(k, psd, rubber, 1e4, 0.0, 1.0, [])
     for name, values in (("pressure", ([], 1.0)), ("velocity", (1e4, []))):
         with pytest.raises(ValueError, match=f"^{name}: has no value, must have at least one$"):
             theory.persson(k, psd, rubber, *values)

@@ -101,6 +101,8 @@ def persson_speed_step(
     change = _Change(material, number("velocity_before", velocity_before, 0.0),
                      number("velocity_after", velocity_after, 0.0))
     t = array_of("times", np.atleast_1d(np.asarray(times)), low=0.0, ndim=1)
+    if not t.size:
+        raise ValueError("times: has no value, must have at least one")
     factor = 2.0 / (1.0 - poisson_ratio(poisson))
     weight = number("gamma", gamma, 0.0, 1.0)
     points = int(number("angles", angles, 8))
@@ -111,9 +113,9 @@ def persson_speed_step(
             fine, resolved = panels.resolving(change.after * now)
         squared, loss = change.means(fine, resolved, now, points)
         found.append(_at(panels, contact_of(fine, factor**2 * squared, factor * loss, p, weight)))
-    return PerssonContact(*(np.array([getattr(one, name) for one in found])
-                            if name != "wavenumber" else found[0].wavenumber
-                            for name in PerssonContact.__dataclass_fields__))
+    over_time = {name: np.array([getattr(one, name) for one in found])
+                 for name in ("area", "friction_up_to", "contact_area", "friction")}
+    return PerssonContact(found[0].wavenumber, **over_time)
 
 
 def _at(panels: Panels, contact: PerssonContact) -> PerssonContact:
