@@ -279,8 +279,9 @@ asperity.sweep(case, {"phase[1].pressure": [1e3, 2e3, 3e3]}, jobs=2, folder=sys.
 
 
 def hear_ctrl_c():
-    """Do not ignore Ctrl-C, which background jobs inherit from the shell as ignored."""
+    """Do not ignore Ctrl-C, as background jobs of a shell do, or SIGHUP, as under nohup."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize("moment", ["start", "poll"])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -226,7 +228,8 @@ def _friction(chosen: argparse.Namespace) -> int:
         way_on = f"the same command{again} goes on with what is in {folder}"
         if isinstance(stop, KeyboardInterrupt):
             raise KeyboardInterrupt(way_on) from None
-        print(f"asperity: stopped by a signal: {way_on}", file=sys.stderr)
+        with contextlib.suppress(OSError):  # nobody may read it any more
+            os.write(2, f"asperity: stopped by a signal: {way_on}\n".encode())
         raise
     print(curve.summary(plan.all_notes))
     for output in outputs:
