@@ -408,6 +408,20 @@ def test_the_script_of_a_job_array(tmp_path, monkeypatch):
     assert all(run.finished for run in table.runs)
 
 
+def test_a_program_behind_a_script_does_not_miss_its_parent(tmp_path, monkeypatch, program):
+    """The parent of the run is the script, not the process of the sweep."""
+    script = tmp_path / "script"
+    script.write_text(f"#!/bin/sh\n'{program}' \"$@\"\n")
+    script.chmod(0o755)
+    monkeypatch.setenv("ASPERITY_PROGRAM", str(script))
+    asperity.runs.program.program.cache_clear()
+    try:
+        table = sweep(sliding(), {"phase[1].pressure": [1e3]}, folder=tmp_path / "a")
+    finally:
+        asperity.runs.program.program.cache_clear()
+    assert table.runs[0].finished
+
+
 def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program):
     """Two sweeps of one folder at once: each case is run by one of them."""
     case = sliding()

@@ -81,7 +81,8 @@ contains
       before = c_signal(signal_pipe, ignore)
    end subroutine catch_signals
 
-   !> Stop the run when the process that started it has ended, if that process has given its number.
+   !> Stop the run when the process that started it has ended, if that process has given its number. If another process
+   !> is in between, such as a shell script, the run cannot know.
    subroutine end_with_parent()
       character(16) :: text
       integer :: status
@@ -89,6 +90,7 @@ contains
       call get_environment_variable('ASPERITY_PARENT', text, status=status)
       if (status == 0) read (text, *, iostat=status) parent
       if (status /= 0) parent = 0
+      if (parent /= c_getppid()) parent = 0
    end subroutine end_with_parent
 
    !> If the parent has ended, behave as after SIGTERM.
