@@ -614,3 +614,24 @@ def test_any_value(program, folder, variable, value):
 )
 def test_any_command_line(program, folder, arguments):
     call(program, *arguments, cwd=folder)
+
+
+@pytest.mark.parametrize(("nx", "ny", "steps", "every", "friction"), [
+    (32, 1, 700, 1, False), (64, 64, 100, 7, True), (363, 400, 4, 1, True), (8, 8, 10, 0, False)])
+def test_the_size_of_a_result_is_foreseen(program, tmp_path, nx, ny, steps, every, friction):
+    """A field of 363 x 400 cells fills two chunks in part, which are stored whole."""
+    case = asperity.Case(
+        grid=dict(nx=nx, ny=ny, lx=1e-3), material=dict(shear_modulus=1e6, thickness=1e-3),
+        surface=dict(shape="sine", amplitude=2e-6, wavelength=1e-3),
+        phase=[dict(pressure=1e4), dict(duration=0.01, steps=steps, velocity_x=1e-3)],
+        output=dict(compression=0, snapshot_every=every))
+    if friction:
+        case.friction.update(law="coulomb", coefficient=0.3)
+    case.write(tmp_path / "y.nml")
+    said = re.search(r"! result: about ([\d.]+) MB with (\d+) snapshots?, before compression",
+                     call(program, "check", tmp_path / "y.nml").out)
+    assert call(program, "run", tmp_path / "y.nml", "--quiet").returncode == 0
+    result = tmp_path / "y.h5"
+    assert len(asperity.open(result).snapshots) == int(said[2])
+    size = 1e-6 * result.stat().st_size
+    assert abs(float(said[1]) - size) < 0.1 + 0.06 * size

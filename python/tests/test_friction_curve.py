@@ -669,7 +669,7 @@ def test_a_picture_of_many_curves_has_a_colour_for_each_and_room_for_the_panels(
     assert len({line.get_color() for line in curves}) == len(curves) == 12
     assert len(figure.axes) == 2 * 3
     heights = [panel.get_window_extent().height / figure.dpi for panel in figure.axes]
-    assert min(heights) > 1.2
+    assert min(heights) > 1.5
     legend = figure.legends[0].get_window_extent()
     assert not any(panel.get_window_extent().overlaps(legend) for panel in figure.axes)
     assert legend.y0 >= 0.0

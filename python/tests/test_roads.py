@@ -236,6 +236,20 @@ def test_drawn_maps_have_the_height_and_the_slope_of_the_spectrum(hurst, side):
     assert found.rms_height == pytest.approx(1e-5, rel=0.005)
 
 
+@pytest.mark.parametrize("side, within", [(1, 0.04), (2, 0.01), (4, 0.005)])
+def test_drawn_maps_of_a_narrow_band(side, within):
+    """A side of one longest wave has few modes between this wave and one of half its length."""
+    for hurst in (0.3, 0.6, 1.0):
+        for band in (2.0, 2.7, 4.0):
+            knots = theory.self_affine_psd(hurst, 1.0, 1.0, 1.0 / band, rms_slope=0.2)
+            cells = 32 * side
+            found = asperity.surface.statistics(
+                Spectrum(*knots).draw(cells, cells, side, side, 1), side, side)
+            height, slope = theory.psd_moments(*knots)
+            assert found.rms_height == pytest.approx(height, rel=0.01)
+            assert found.rms_slope == pytest.approx(slope, rel=within)
+
+
 def test_a_profile_has_the_spectrum_of_its_isotropic_road():
     """By Abel's transform Phi = (1 + k^2)^-2 has the profile (1 + k^2)^-1.5 / 4."""
     k = np.geomspace(1e-2, 1e3, 400)

@@ -173,8 +173,10 @@ def test_measure(tmp_path):
     def broken(run):
         raise RuntimeError("in the callable")
 
-    with pytest.raises(RuntimeError, match="in the callable"):
+    with pytest.raises(RuntimeError, match="in the callable") as caught:
         sweep(wave(), {"phase.pressure": [0.1 * FULL, 0.2 * FULL]}, folder=tmp_path, measure=broken)
+    if sys.version_info >= (3, 11):
+        assert caught.value.__notes__[0].startswith("measure: was called for ")
     assert len(list(tmp_path.glob("*.h5"))) == 3
     with pytest.raises(ValueError, match=r"measure: returned 1 for phase.*: must return a dict"):
         sweep(wave(), {"phase.pressure": [0.2 * FULL]}, folder=tmp_path,
@@ -422,10 +424,10 @@ def test_a_program_behind_a_script_does_not_miss_its_parent(tmp_path, monkeypatc
     assert table.runs[0].finished
 
 
-def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program):
+def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program, capsys):
     """Two sweeps of one folder at once: each case is run by one of them."""
     case = sliding()
-    case.phase[2].steps = 300
+    case.phase[2].steps = 2000
     parameters = {"phase[1].pressure": [1e3]}
     name = sweep(case, parameters, folder=tmp_path / "name").paths[0].name
     folder = tmp_path / "parts"
@@ -434,7 +436,9 @@ def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program):
     process = subprocess.Popen([program, "run", f"{Path(name).stem}.nml", "--quiet"], cwd=folder,
                                stderr=subprocess.DEVNULL)
     wait_for_rows(process, folder / name, 2)
-    table = sweep(case, parameters, folder=folder)
+    capsys.readouterr()
+    table = sweep(case, parameters, folder=folder, quiet=False)
+    assert "waits for another process that runs it" in capsys.readouterr().err
     assert process.wait(PATIENCE) == 0
     assert table.failed == [] and table.runs[0].finished
 

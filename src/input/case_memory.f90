@@ -13,6 +13,7 @@ module case_memory
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
    use case_settings, only : case_type, road_moves
+   use hdf5_slabs, only : slab_rows
    use regular_grid, only : boundary_free
    implicit none
    private
@@ -32,7 +33,9 @@ module case_memory
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
-   real(dp), parameter :: row_of_history = 400.0_dp   !! bytes
+   ! Of a result, bytes, as measured: the file without rows and snapshots, a row of the history, and the groups, names and
+   ! units of a field in a snapshot.
+   real(dp), parameter :: file_itself = 0.22e6_dp, row_of_history = 320.0_dp, field_itself = 5.4e3_dp
 
    real(dp), parameter :: program_itself = 26.0e6_dp  !! with its libraries, bytes
    real(dp), parameter :: chunk = 131072.0_dp         !! most values of a chunk of the result
@@ -100,25 +103,35 @@ contains
    pure function most_snapshots(case) result(n)
       type(case_type), intent(in) :: case
       integer :: n
-      integer :: rows
+      integer :: last                              !! row, from 0
 
-      rows = count_rows(case%phases)
-      n = size(case%output%snapshot_times) + 1
-      if (case%output%snapshot_every > 0) n = n + rows/case%output%snapshot_every
-      n = min(n, rows)
+      last = count_rows(case%phases) - 1
+      associate (every => case%output%snapshot_every)
+         if (every > 0) then
+            n = last/every + 1
+            if (mod(last, every) > 0) n = n + 1    ! the last row has a snapshot anyway
+         else
+            n = min(size(case%output%snapshot_times), last) + 1
+         end if
+      end associate
    end function most_snapshots
 
-   !> Most bytes of the result before compression: the height, the snapshots and the history. A state of contact is a
-   !> byte, any other value of a field has eight.
+   !> Bytes of the result of a run before compression. A state of contact is a byte, any other value of a field has eight.
+   !> The last chunk of a field is stored as a whole.
    pure function result_size(case) result(bytes)
       type(case_type), intent(in) :: case
       real(dp) :: bytes
-      integer :: fields, states
+      real(dp) :: values
+      integer :: fields, of_chunk, rows, states
 
       states = count(case%output%snapshot_fields == 'contact')
       fields = size(case%output%snapshot_fields) - states
-      bytes = real(case%grid%nx, dp)*real(case%grid%ny, dp) &
-         *(8.0_dp + most_snapshots(case)*(8.0_dp*fields + states)) + row_of_history*count_rows(case%phases)
+      of_chunk = slab_rows(case%grid%nx)
+      rows = case%grid%ny
+      if (rows > of_chunk) rows = of_chunk*((rows - 1)/of_chunk + 1)
+      values = real(case%grid%nx, dp)*real(rows, dp)
+      bytes = file_itself + row_of_history*count_rows(case%phases) + 8.0_dp*values &
+         + most_snapshots(case)*((8.0_dp*fields + states)*values + field_itself*(fields + states))
    end function result_size
 
    !> Copies of the arms, and with friction of the displacements, before a row that is taken in parts, bytes. They are

@@ -69,7 +69,7 @@ contains
       text = text//joint_note(case)
       if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
          ': '//memory_text(limit)//nl
-      text = text//'! result: at most '//memory_text(result_size(case))//' with '// &
+      text = text//'! result: about '//memory_text(result_size(case))//' with '// &
          counted(most_snapshots(case), 'snapshot')//', before compression'//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'
       if (case%friction%law /= 'none' .and. case%friction%slope_effect) text = text//'; rows on steep roads may take '// &

@@ -54,9 +54,11 @@ contains
          call get_environment_variable('SLURM_JOB_END_TIME', text, status=status)
          if (status /= 0) return
          read (text, *, iostat=status) finish
-         if (status /= 0) self%remark = 'SLURM_JOB_END_TIME = '//trim(text)//': must be a number of seconds: '// &
-            'without it the run has no time limit (--time-limit gives one)'
-         if (status /= 0) return
+         if (status /= 0) then
+            self%remark = 'SLURM_JOB_END_TIME = '//trim(text)//': must be a number of seconds since 1970: without '// &
+               'it the run has no time limit (--time-limit gives one)'
+            return
+         end if
          left = real(finish - c_time(0_c_long), dp)
       end if
       self%limited = .true.

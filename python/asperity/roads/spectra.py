@@ -169,8 +169,8 @@ class Spectrum:
         """Return a periodic map with random phases and the amplitudes of the spectrum.
 
         The amplitude of a mode follows from the mean density over its cell of the wave-vector
-        plane, so that rms height and slope are those of the spectrum: within 1 % on sides of a few
-        longest waves, and within 3 % on a side of one longest wave with a narrow band.
+        plane, so that rms height and slope are those of the spectrum: within 1 % on sides of two
+        longest waves and more, and within about 3 % on a side of one longest wave.
 
         Parameters
         ----------

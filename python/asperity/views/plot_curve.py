@@ -33,7 +33,7 @@ _LEGEND_COLUMNS = 4
 _MOST_KEYS = 4          # interval, theory and the two markers
 _LEGEND_ROW = 0.16      # height of a row of the legend, inches
 _ONLY_ROW = 2.5         # height of the panels if there is a single row, inches
-_ROW = 1.8              # and of each of several rows
+_ROW = 2.1              # and of each of several rows
 _FEW_DECADES = 1000.0   # ratio of the ends of an axis up to which 1, 2 and 5 are labelled
 
 
@@ -73,8 +73,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
         for index, colour in enumerate(distinct_colours(colours.size)):
             label = _words(plan.colours, float(colours[index])) if colours.size > 1 else "runs"
             grid[0, 0].plot([], [], "o-", color=colour, label=label)
-        _legend(figure, grid[0, 0], _flags(curve), plan.dashes,
-                any(np.isfinite(curve.mean(name)[1]).any() for name, *_ in plan.panels))
+        _legend(figure, grid[0, 0], plan)
         figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
     return shown_once(figure)
 
@@ -91,6 +90,12 @@ class _Plan:
         The quantity along the horizontal axis, and those of the rows of panels and of the colours.
     panels : list of (str, str, str)
         Names of the variable and of its theory, and the label of the axis, from left to right.
+    means : dict of (ndarray, ndarray, ndarray)
+        Mean and interval of each variable.
+    flags : (ndarray of bool, ndarray of bool)
+        The points with warnings, and those with states that are left out.
+    floor : float
+        The least contact area that is drawn.
     """
 
     axes: dict[str, FloatArray]
@@ -98,6 +103,9 @@ class _Plan:
     rows: str
     colours: str
     panels: list[tuple[str, str, str]]
+    means: dict[str, tuple[FloatArray, FloatArray, FloatArray]]
+    flags: tuple[NDArray[np.bool_], NDArray[np.bool_]]
+    floor: float
 
     def values(self, name: str) -> FloatArray:
         """Return the values of a quantity."""
@@ -127,18 +135,20 @@ def _plan_of(curve: FrictionCurve) -> _Plan:
               ("contact_area", "area_persson", "contact area fraction")]
     if not float(curve.settings.get("coefficient", 0.0)):
         panels = panels[1:]  # without friction in the interface all of it is loss in the rubber
-    return _Plan(axes, along, rows, colours, panels)
+    warned, lost = (np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True))
+    return _Plan(axes, along, rows, colours, panels,
+                 {name: curve.mean(name) for name, *_ in panels}, (warned, lost), _floor(curve))
 
 
 def _draw_line(curve: FrictionCurve, plan: _Plan, places: NDArray[Any],
                where: tuple[int | slice, ...], colour: str) -> None:
     """Draw one line in each panel of a row, with its interval, its marks and its theory."""
     x = plan.values(plan.along)
-    flagged = [one[where] for one in _flags(curve)]
+    flagged = [one[where] for one in plan.flags]
     for panel, (name, theory, _) in zip(places, plan.panels, strict=True):
-        mean, low, high = (part[where] for part in curve.mean(name))
+        mean, low, high = (part[where] for part in plan.means[name])
         if name == "contact_area":
-            low = np.where(low <= 0.0, _floor(curve), low)
+            low = np.where(low <= 0.0, plan.floor, low)
         if x.size == 1:
             panel.vlines(x, low, high, color=colour, alpha=0.4, linewidth=3.0)
         else:
@@ -148,11 +158,6 @@ def _draw_line(curve: FrictionCurve, plan: _Plan, places: NDArray[Any],
         if theory:
             panel.plot(x, curve.theory[theory][where], plan.dashes, color=colour, linewidth=0.9,
                        markersize=7)
-
-
-def _flags(curve: FrictionCurve) -> list[NDArray[np.bool_]]:
-    """Return the points with warnings, and those with states that are left out."""
-    return [np.asarray(curve.states_with(lost=lost).any(axis=-1)) for lost in (False, True)]
 
 
 def _name_row(panel: Axes, text: str) -> None:
@@ -180,18 +185,18 @@ def _dress(curve: FrictionCurve, plan: _Plan, grid: NDArray[Any]) -> None:
         column[-1].set_xlabel({"speed": "speed (m/s)", "pressure": "pressure (Pa)",
                                "temperature": "temperature (°C)"}[plan.along])
     for panel, (name, theory, _) in zip(grid[0], plan.panels, strict=True):
-        _scale(panel, curve, name, theory)
+        _scale(panel, curve, plan, name, theory)
     for panel in grid[:, -1]:
         _mark_decades(panel)
 
 
-def _scale(panel: Axes, curve: FrictionCurve, name: str, theory: str) -> None:
+def _scale(panel: Axes, curve: FrictionCurve, plan: _Plan, name: str, theory: str) -> None:
     """Scale a vertical axis by the means and the theory.
 
     The intervals of two patches are often many times as wide as the curve. They do not count beyond
     twice the largest mean, or below half of the least one on a logarithmic axis.
     """
-    found = curve.mean(name)[0]
+    found = plan.means[name][0]
     if theory:
         found = np.concatenate([found.ravel(), curve.theory[theory].ravel()])
     found = found[np.isfinite(found)]
@@ -199,7 +204,7 @@ def _scale(panel: Axes, curve: FrictionCurve, name: str, theory: str) -> None:
         panel.set_yscale("log")
         if found.max(initial=0.0) > 0.0:
             low, high = panel.get_ylim()
-            panel.set_ylim(max(low, _floor(curve)), min(high, 2.0 * float(found.max())))
+            panel.set_ylim(max(low, plan.floor), min(high, 2.0 * float(found.max())))
     else:
         least, most = (float(end) for end in (found.min(initial=0.0), found.max(initial=0.0)))
         low, high = panel.get_ylim()
@@ -227,19 +232,19 @@ def _mark_decades(panel: Axes) -> None:
     panel.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _legend(figure: Figure, panel: Axes, flagged: list[NDArray[np.bool_]], dashes: str,
-            intervals: bool) -> None:
+def _legend(figure: Figure, panel: Axes, plan: _Plan) -> None:
     """Draw the legend beside the panels, because the intervals may fill them.
 
     With a marker in place of dashes, the intervals are bars.
     """
-    if intervals and dashes == "--":
+    intervals = any(np.isfinite(low).any() for _, low, _ in plan.means.values())
+    if intervals and plan.dashes == "--":
         panel.fill_between([], [], [], color="k", alpha=0.2, linewidth=0, label="95 % interval")
     elif intervals:
         panel.plot([], [], "|", color="k", alpha=0.4, markersize=9, markeredgewidth=3.0,
                    label="95 % interval")
-    panel.plot([], [], f"k{dashes}", linewidth=0.9, markersize=7, label="Persson's theory")
-    for some, marker, text in zip(flagged, _MARKERS, ("with warnings", "not converged"),
+    panel.plot([], [], f"k{plan.dashes}", linewidth=0.9, markersize=7, label="Persson's theory")
+    for some, marker, text in zip(plan.flags, _MARKERS, ("with warnings", "not converged"),
                                   strict=True):
         if some.any():
             panel.plot([], [], marker, color="k", fillstyle="none", markersize=7, label=text)
