@@ -18,8 +18,8 @@ link=$(PKG_CONFIG_PATH="$libraries/pkgconfig" pkg-config --libs mkl-dynamic-lp64
 # The libraries stand before the objects that need them, where the linker would leave them out. The macro
 # also keeps this build apart from that with FFTW.
 link="-Wl,-rpath,$libraries -Wl,--push-state,--no-as-needed $link -Wl,--pop-state"
-fpm build --profile release --flag -DASPERITY_MKL --link-flag "$link" asperity
-program=$(fpm run --profile release --flag -DASPERITY_MKL --link-flag "$link" --runner echo asperity |
+fpm build --profile release --flag "-DASPERITY_MKL $FPM_FFLAGS" --link-flag "$link" asperity
+program=$(fpm run --profile release --flag "-DASPERITY_MKL $FPM_FFLAGS" --link-flag "$link" --runner echo asperity |
   grep '/app/asperity' | tail -n 1)
 # A running program keeps the old file.
 cp "$program" .venv/bin/asperity-mkl.new

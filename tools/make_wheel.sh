@@ -6,6 +6,7 @@
 set -eu
 caller=$PWD
 cd "$(dirname "$0")/.."
+ASPERITY_PORTABLE=1
 . tools/setup.sh
 . tools/setup_wheel.sh
 

@@ -40,6 +40,20 @@ fi
 PATH=$PWD/.venv/bin:$PATH
 export PATH
 
+# What is built here is for this machine: the vector registers of 256 bits are used, where it has them. Products and
+# sums stay separate operations, with the rounding of other machines. ASPERITY_PORTABLE=1 builds for all processors.
+for name in FFLAGS FPM_FFLAGS; do
+  eval "flags=\${$name:-}"
+  flags=$(printf '%s' "$flags" | sed 's/ *-mavx2//g')
+  if [ -z "${ASPERITY_PORTABLE:-}" ] && grep -qsw avx2 /proc/cpuinfo; then
+    case $flags in
+      *-march=*) ;;
+      *) flags="${flags:+$flags }-mavx2" ;;
+    esac
+  fi
+  export "$name=$flags"
+done
+
 # fpm.toml asks the linker for Debian's name of the serial HDF5 library. Elsewhere the library is
 # called hdf5: give it the other name in a folder that the compiler searches.
 if ! pkg-config --exists hdf5-serial 2>/dev/null && pkg-config --exists hdf5 2>/dev/null; then

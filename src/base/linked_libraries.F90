@@ -3,7 +3,7 @@
 !> are those of Intel's MKL, which has the interface of FFTW.
 module linked_libraries
    use, intrinsic :: iso_c_binding, only : c_associated, c_char, c_f_pointer, c_int, c_ptr
-   use, intrinsic :: iso_fortran_env, only : compiler_version
+   use, intrinsic :: iso_fortran_env, only : compiler_options, compiler_version
    use asperity_parallel, only : parallel_library
    implicit none
    private
@@ -48,11 +48,19 @@ contains
       parallel = parallel_library()
       if (parallel == '') parallel = 'none'
 
-      text = 'compiler: '//compiler_version()//new_line('a')// &
+      text = 'compiler: '//compiler_version()//processors()//new_line('a')// &
          'FFTW: '//fftw_version()//new_line('a')// &
          'HDF5: '//trim(hdf5)//new_line('a')// &
          'MPI: '//parallel//new_line('a')
    end function linked_versions
+
+   !> The processors that the program is restricted to by the vector registers that it uses.
+   pure function processors() result(text)
+      character(:), allocatable :: text
+
+      text = ''
+      if (index(compiler_options(), '-mavx2') > 0) text = ', for processors with AVX2'
+   end function processors
 
 #ifdef ASPERITY_MKL
    !> The version of MKL, which stands in for FFTW: "Intel(R) oneAPI Math Kernel Library Version 2026.2 ...".
