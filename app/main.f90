@@ -97,7 +97,11 @@ contains
       else if (find_template(command%path) == 0) then
          message = 'asperity: there is no template '''//in_one_line(command%path, 60)//''''
          near = nearest_name(command%path, all_template_names())
-         if (near /= '') message = message//'; did you mean '//near//'?'
+         if (near /= '') then
+            message = message//'; did you mean '//near//'?'
+         else
+            message = message//': `asperity template` lists all templates'
+         end if
          call fail(error, error_input, message)
       else if (.not. template_is_available(command%path)) then
          call fail(error, error_input, 'asperity: the template '//command%path//' is not available yet')

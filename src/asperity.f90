@@ -24,10 +24,10 @@ module asperity
    use case_settings, only : case_type
    use contact_fields, only : contact_rows, field_rows
    use contact_solver, only : contact_solver_type
-   use asperity_errors, only : error_convergence, error_file, error_input, error_type
+   use asperity_errors, only : error_convergence, error_file, error_input, error_memory, error_type
    use fft_conv, only : convolution_type, new_convolution
    use friction_cg, only : friction_fields_type, friction_solver_type, new_friction_solver
-   use friction_law, only : friction_law_type, new_friction_law
+   use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, new_friction_law
    use history_row, only : history_row_type
    use asperity_interpolation, only : displaced, interpolation_type, new_interpolation, shifted
    use kernels, only : kernel_type, normal_half_space, tangential_half_space

@@ -50,6 +50,7 @@ program main
    use test_steady, only : run_steady
    use test_surface, only : run_surface
    use test_viscoelastic_energy, only : run_viscoelastic_energy
+   use test_wrong_arguments, only : run_wrong_arguments
    use test_xdmf, only : run_xdmf
    use test_zener, only : run_zener
    implicit none
@@ -112,7 +113,8 @@ program main
          suite_type('schur', run_schur), &
          suite_type('adhesion_free', run_adhesion_free), &
          suite_type('adhesion_spots', run_adhesion_spots), &
-         suite_type('facade', run_facade)])
+         suite_type('facade', run_facade), &
+         suite_type('wrong_arguments', run_wrong_arguments)])
    call end_processes()
 
 end program main

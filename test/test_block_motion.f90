@@ -9,7 +9,7 @@ module test_block_motion
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi
    use asperity_simulation, only : new_simulation, simulation_type
-   use simulation_runs, only : check_books, nl, record_type, run_case
+   use simulation_runs, only : check_books, last, nl, record_type, run_case
    use text_tools, only : exact_text, to_text
    implicit none
    private
@@ -41,6 +41,7 @@ contains
       if (selected('held_block_comes_to_rest')) call held_block_comes_to_rest()
       if (selected('motion_of_a_block_is_second_order')) call motion_of_a_block_is_second_order()
       if (selected('books_of_a_flat_block_close')) call books_of_a_flat_block_close()
+      if (selected('block_rests_after_an_infinite_time')) call block_rests_after_an_infinite_time()
    end subroutine run_block_motion
 
    !> The rule under a given force m a(t), a = cos(w t): it is of second order for steps of two lengths, and
@@ -263,20 +264,54 @@ contains
       call check_close(missing(2), 0.0_dp, 0.01_dp, 'flat block: missing work')
    end subroutine books_of_a_flat_block_close
 
+   !> A block that sticks to the road is strained by the motion of the road, or by the force that pulls it. After an
+   !> infinite time it is at rest, its arms carry nothing, and nothing changes in the time after that.
+   subroutine block_rests_after_an_infinite_time()
+      real(dp), parameter :: load = 1e5_dp, pull = 2e4_dp
+      character(*), parameter :: drives(3) = [character(40) :: 'velocity_x = 0.3 | relaxed = .true.', &
+         'velocity_x = 0.3 | steady = .true.', 'traction_x = 2e4 | traction_x = 2e4, relaxed = .true.']
+      type(record_type) :: record
+      integer :: k, bar
+      real(dp) :: expected
+
+      do k = 1, 3
+         bar = index(drives(k), '|')
+         call run_case('&grid nx = 4, ny = 2, lx = 2e-3 /'//nl//'&surface shape = ''flat'' /'//nl//solid()//nl// &
+            '&friction law = ''coulomb'', coefficient = 100. /'//nl//'&solver tolerance = 1e-10 /'//nl// &
+            '&phase pressure = 1e5, duration = 1e-4, steps = 10, '//drives(k)(:bar - 1)//' /'//nl// &
+            '&phase duration = 1e-3, steps = 5, '//trim(drives(k)(bar + 1:))//' /', trim(drives(k)), record)
+         expected = pull/load
+         if (k < 3) expected = g_e*record%rows(last(record))%road_x/(height*load)
+         associate (rows => record%rows(last(record) - 5:))
+            call check_order(abs(record%rows(last(record) - 6)%sliding_speed), '>', 0.01_dp, 'the block moved')
+            call check_close(maxval(abs(rows%friction - expected)), 0.0_dp, 1e-8_dp*expected, 'rest: friction')
+            call check_close(maxval(abs(rows%sliding_speed)), 0.0_dp, 1e-8_dp, 'rest: speed')
+            call check_close(maxval(rows%energy_kinetic), 0.0_dp, 1e-16_dp*maxval(rows%energy_elastic), 'rest: energy')
+         end associate
+         call check_books(record, 'rest', 1e-9_dp)
+      end do
+   end subroutine block_rests_after_an_infinite_time
+
    !> The case. The pressure is such that the friction is that of the phase for a coefficient of 0.5.
    function flat(steps) result(text)
       integer, intent(in) :: steps                          !! per period
       character(:), allocatable :: text
       integer :: i
 
-      text = '&grid nx = 4, ny = 2, lx = 2e-3 /'//nl//'&surface shape = ''flat'' /'//nl// &
-         '&material shear_modulus = 1e6, prony_g = 0.3e6, 0.2e6, prony_tau = '//exact_text(tau(1))//', '// &
-         exact_text(tau(2))//', thickness = 1e-3, density = 2000 /'//nl// &
+      text = '&grid nx = 4, ny = 2, lx = 2e-3 /'//nl//'&surface shape = ''flat'' /'//nl//solid()//nl// &
          '&friction law = ''coulomb'', coefficient = 0.5 /'//nl//'&solver tolerance = 1e-10, passes = 4 /'//nl
       do i = 1, 3
          text = text//'&phase pressure = '//exact_text(2.0_dp*friction(i))//', velocity_x = 0.3, duration = '// &
             exact_text(length)//', steps = '//to_text(4*steps)//' /'//nl
       end do
    end function flat
+
+   !> The material.
+   function solid() result(text)
+      character(:), allocatable :: text
+
+      text = '&material shear_modulus = 1e6, prony_g = 0.3e6, 0.2e6, prony_tau = '//exact_text(tau(1))//', '// &
+         exact_text(tau(2))//', thickness = 1e-3, density = 2000 /'
+   end function solid
 
 end module test_block_motion

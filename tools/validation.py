@@ -410,9 +410,10 @@ def adhesion() -> Chapter:
 
     square = {t: computed(t, "maugis_dugdale") for t in tabor[tabor <= 1.0]}
     smooth = {t: computed(t, "exponential") for t in tabor}
-    rows = [Row(f"Maugis-Dugdale, Tabor parameter {t:g}", a * 1e3, known(t) * 1e3, "mm")
+    rows = [Row(f"contact radius, Maugis-Dugdale, Tabor parameter {t:g}", a * 1e3, known(t) * 1e3, "mm")
             for t, a in square.items()]
-    rows.append(Row("exponential, Tabor parameter 5, JKR", smooth[5.0] * 1e3, jkr * 1e3, "mm"))
+    rows.append(Row("contact radius, exponential, Tabor parameter 5, JKR", smooth[5.0] * 1e3,
+                    jkr * 1e3, "mm"))
     rows += [pull_off(*given) for given in ((1.0, 0.13), (2.0, 0.13), (2.0, 0.26), (5.0, 0.8))]
     figure, axes = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
     fine = np.geomspace(0.05, 10.0, 60)

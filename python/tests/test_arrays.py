@@ -23,6 +23,16 @@ def solved(height, lx, ly, **load):
     return asperity.solve_normal(height, lx, ly, 2 * 1e6 / 0.5, tolerance=1e-8, **load)
 
 
+def test_a_list_of_surfaces_takes_arrays():
+    case = asperity.Case(surface=wave(), grid=dict(lx=1.2e-3, ly=0.8e-3), material=MATERIAL,
+                         phase=dict(pressure=3e3))
+    case.surface.append(wave())
+    case.surface.extend([wave().tolist()])
+    case.surface += [wave()]
+    assert [one["shape"] for one in case.surface] == ["file"] * 4
+    asperity.Simulation(case).advance()
+
+
 def test_a_case_takes_an_array(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     height = wave()

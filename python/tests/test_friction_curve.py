@@ -317,9 +317,10 @@ def test_the_same_however_it_is_run(tmp_path):
     alone = curve_of(plan, tmp_path / "alone")
     same(alone, curve_of(plan, tmp_path / "four", jobs=4))
     with ThreadPoolExecutor(2) as executor:
-        same(alone, run_curve(plan, tmp_path / "threads", Means(1, executor=executor), quiet=True))
+        same(alone, run_curve(plan, tmp_path / "threads", Means(None, executor=executor),
+                              quiet=True))
     with ProcessPoolExecutor(2) as executor:
-        same(alone, run_curve(plan, tmp_path / "processes", Means(1, executor=executor),
+        same(alone, run_curve(plan, tmp_path / "processes", Means(None, executor=executor),
                               quiet=True))
     # patches that are added later leave the others as they are
     more = curve_of(replace(plan, patches=3), tmp_path / "alone")
@@ -340,7 +341,7 @@ def test_the_same_through_dask(tmp_path):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None,
                                   local_directory=str(tmp_path)) as cluster, \
             distributed.Client(cluster) as client:
-        found = run_curve(plan, tmp_path / "dask", Means(1, executor=client.get_executor()),
+        found = run_curve(plan, tmp_path / "dask", Means(None, executor=client.get_executor()),
                           quiet=True)
     same(found, curve_of(plan, tmp_path / "alone"))
 
@@ -451,7 +452,7 @@ def test_an_input_that_cannot_be_written_is_named(tmp_path, executor):
     patch = small_plan(patches=1).road.patch(0)
     patch.save(tmp_path)  # which is larger than the limit below
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    means = Means(1, executor=ThreadPoolExecutor(1)) if executor else Means(1)
+    means = Means(None, executor=ThreadPoolExecutor(1)) if executor else Means(1)
     resource.setrlimit(resource.RLIMIT_FSIZE, (40, before[1]))
     try:
         with pytest.raises(OSError, match=rf"{patch.code}-p200000-T20-\w+\.nml: cannot be written"):
@@ -485,7 +486,7 @@ def test_a_job_array_fills_the_folder(tmp_path, monkeypatch):
         (tools / name).chmod(stat.S_IRWXU)
     monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
     plan = small_plan()
-    slurm = Means(1, slurm="--time=1:00:00 --partition='short jobs'")
+    slurm = Means(None, slurm="--time=1:00:00 --partition='short jobs'")
     with pytest.raises(SubmittedError, match="2 runs submitted to Slurm as job 4711"):
         run_curve(plan, tmp_path / "runs", slurm, quiet=True)
     call = (tmp_path / "calls").read_text()
@@ -502,7 +503,7 @@ def test_the_same_through_slurm(tmp_path):
     """The Slurm of this machine takes the job; the command waits for it and gathers the results."""
     plan = small_plan()
     with Slurm() as slurm:
-        means = Means(1, slurm="--time=10 --partition=short")
+        means = Means(None, slurm="--time=10 --partition=short")
         with pytest.raises(SubmittedError, match="2 runs submitted to Slurm as job"):
             run_curve(plan, tmp_path / "runs", means, quiet=True)
         slurm.drain()
@@ -517,7 +518,7 @@ def test_jobs_in_the_queue_are_not_submitted_again(tmp_path, monkeypatch):
         (tmp_path / name).chmod(stat.S_IRWXU)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.chdir(tmp_path)
-    slurm = Means(1, slurm="")
+    slurm = Means(None, slurm="")
     for word in ("submitted to Slurm as job 12", "in the queue of Slurm as job 12"):
         with pytest.raises(SubmittedError, match=word):
             run_curve(small_plan(), tmp_path / "runs", slurm, quiet=True)

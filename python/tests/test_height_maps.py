@@ -139,6 +139,8 @@ def test_wrong_shapes():
             asperity.surface.shape(name, 16, wavelength=1.0)
         with pytest.raises(ValueError, match=r"^amplitude: is missing: .*\nwavelength: is missing"):
             asperity.surface.shape(name, 16, radius=1.0)
+    with pytest.raises(ValueError, match=r"^amplitude = 5\.0: does not belong to 'sphere'$"):
+        asperity.surface.shape("sphere", 16, radius=1.0, amplitude=5.0)
     assert not asperity.surface.shape("sine", 16, amplitude=0.0, wavelength=1.0).any()
 
 

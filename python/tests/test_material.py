@@ -198,6 +198,8 @@ def test_namelist_holds_the_numbers_exactly():
     assert values["wlf_c1"] == [8.86] and values["reference_temperature"] == [20.0]
     assert values["poisson"] == [0.49] and values["temperature"] == [25.0]
     assert "prony" not in Prony(1e6).to_namelist()
+    weak = Prony(1e6, [0.0, 1e6], [1.0, 2.0]).to_namelist()
+    assert "prony_g = 1000000.0\n" in weak and "prony_tau = 2.0\n" in weak
     assert max(len(line) for line in text.splitlines()) <= 100
 
 

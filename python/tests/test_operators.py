@@ -42,6 +42,8 @@ def test_free_space_is_reciprocal_and_has_an_inverse():
     p, s = random(2, 11, 14)
     assert np.vdot(s, op.apply(p)) == pytest.approx(np.vdot(p, op.apply(s)), rel=1e-12)
     assert np.allclose(op.inverse(op.apply(p)), p, atol=1e-8)
+    for unit in (1e-170, 1e200):                # their squares are 0 and infinite
+        assert np.allclose(op.inverse(op.apply(unit * p)) / unit, p, atol=1e-8)
     my, mx = op.symbol.shape
     assert my >= 2 * 11 - 1 and mx >= 2 * 14 - 1
     padded = np.zeros((my, mx))

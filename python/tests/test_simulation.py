@@ -396,6 +396,18 @@ def test_a_callback_sees_each_row_and_may_end_the_run(tmp_path):
         asperity.run(text, output=tmp_path / "steered.h5", callback=steer)
 
 
+def test_a_velocity_that_moves_the_road_too_far_in_a_step_is_noted_once():
+    sim = asperity.Simulation(BASE + SLIDE)
+    sim.advance()
+    sim.velocity = (1.0, 0.0)                   # 0.27 cells per step
+    sim.advance()
+    sim.velocity = (0.0, -10.0)                 # 2.67 cells
+    words = r"by 2\.67 cells in a step; .* per step: dt = 3\.1[23]e-06 s"
+    with pytest.warns(UserWarning, match=words):
+        sim.advance()
+    sim.advance()
+
+
 def test_what_is_set_must_exist_and_be_a_number():
     """Without the check, a misspelt variable of the load would be ignored silently."""
     sim = asperity.Simulation(BASE + SLIDE)
@@ -407,6 +419,13 @@ def test_what_is_set_must_exist_and_be_a_number():
             setattr(sim, name, "much")
     with pytest.raises(ValueError, match=r"^velocity = .nan, 0.0.: must be"):
         sim.velocity = (np.nan, 0.0)
+
+    for name in ("finished", "rows", "shape", "row", "fields"):
+        with pytest.raises(AttributeError, match=f"named '{name}': there are pressure, force"):
+            setattr(sim, name, 3)
+    for pair in (("1", "2"), (1.0,), (1.0, True)):
+        with pytest.raises(ValueError, match="must be two finite numbers"):
+            sim.velocity = pair
 
     class Controlled(asperity.Simulation):
         target: float

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -383,16 +384,43 @@ def test_a_stopped_sweep_leaves_checkpoints_and_continues(tmp_path, number):
     assert rows_of(first) == len(before)
 
 
+class CountingExecutor(ThreadPoolExecutor):
+    """An executor that counts the calls that wait or run at the same time."""
+
+    now = most = 0
+
+    def submit(self, *words):
+        self.now += 1
+        self.most = max(self.most, self.now)
+        future = super().submit(*words)
+        future.add_done_callback(self._ended)
+        return future
+
+    def _ended(self, _):
+        self.now -= 1
+
+
+@pytest.mark.parametrize(("jobs", "most"), [(None, 3), (2, 2)])
+def test_an_executor_gets_as_many_jobs_at_a_time_as_allowed(tmp_path, jobs, most):
+    with CountingExecutor(1) as executor:
+        table = sweep(sliding(), {"phase[1].pressure": [1e3, 2e3, 3e3]}, folder=tmp_path,
+                      executor=executor, jobs=jobs)
+    assert np.isfinite(table["friction"]).all()
+    assert executor.most == most
+
+
 def test_the_script_of_a_job_array(tmp_path, monkeypatch):
     """A task that is started again keeps a complete result, and continues from a checkpoint."""
     sbatch = tmp_path / "sbatch"
-    sbatch.write_text("#!/bin/sh\necho 7\n")
+    sbatch.write_text(f"#!/bin/sh\necho \"$@\" >{tmp_path}/words\necho 7\n")
     sbatch.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
     folder = tmp_path / "array"
+    threads = os.cpu_count() + 1        # the nodes may have more processors than this machine
     waiting = sweep(sliding(), {"phase[1].pressure": [1e3, 2e3]}, folder=folder, errors="keep",
-                    slurm="--time=1")
+                    slurm="--time=1", jobs=1, threads=threads)
     assert len(waiting.failed) == 2 and "submitted to Slurm" in waiting.failed[0].message
+    assert f"--array=0-1%1 --cpus-per-task={threads} " in (tmp_path / "words").read_text()
 
     def task(number):
         return subprocess.run(["sh", folder / "job.sh"], capture_output=True, text=True,
@@ -541,9 +569,17 @@ def test_wrong_types_are_found_before_the_runs(tmp_path):
     folder = tmp_path / "runs"
     for options, message in (
             (dict(measure=3), "measure = 3: must be a function of a run, or 'steady'"),
-            (dict(executor=3), r"executor = 3: must be a concurrent\.futures\.Executor")):
+            (dict(measure="mean"), "measure = 'mean': must be a function of a run, or 'steady'"),
+            (dict(executor=3), r"executor = 3: must be a concurrent\.futures\.Executor"),
+            (dict(executor=ThreadPoolExecutor(1), slurm=""),
+             "executor and slurm: give only one of them"),
+            (dict(slurm="", jobs=0), "jobs = 0: must be a positive integer")):
         with pytest.raises(ValueError, match=f"^{message}$"):
             asperity.sweep(case, {"phase.pressure": [1e3]}, folder=folder, quiet=True, **options)
+    with pytest.raises(ValueError, match=r"^output\.file: the results of a sweep are named"):
+        asperity.sweep(case, {"output.file": ["a.h5"]}, folder=folder, quiet=True)
+    with pytest.raises(ValueError, match="named 'temperture': did you mean 'temperatures'"):
+        asperity.friction_curve("road.h5", None, speeds=[1.0], pressures=[1e5], temperture=3)
     with pytest.raises(ValueError, match=r"^executor = 3: must be"):
         asperity.friction_curve("road.h5", None, speeds=[1.0], pressures=[1e5], executor=3,
                                 folder=folder)

@@ -34,6 +34,8 @@ module regular_grid
       integer :: first_row = 1                  !! first row of this process, counted from 1
       integer :: last_row = 0                   !! its last row
    contains
+      procedure :: fault
+      procedure :: fits
       procedure :: rows
       procedure :: cells
       procedure :: area
@@ -50,7 +52,7 @@ module regular_grid
 
 contains
 
-   !> Make a grid; the caller has checked that all numbers are positive.
+   !> Make a grid. Operators and solvers refuse a grid that has a `fault`.
    pure function new_grid(nx, ny, lx, ly, boundary) result(self)
       integer, intent(in) :: nx, ny         !! cells along each side
       real(dp), intent(in) :: lx, ly        !! sides, m
@@ -66,6 +68,33 @@ contains
       self%boundary = boundary
       self%last_row = ny
    end function new_grid
+
+   !> What no solver can work with in the numbers of a grid; empty if nothing is wrong.
+   pure function fault(self) result(text)
+      class(grid_type), intent(in) :: self
+      character(:), allocatable :: text
+
+      text = ''
+      if (min(self%nx, self%ny) < 1) then
+         text = 'the numbers of cells of a grid must be positive'
+      else if (.not. (min(self%lx, self%ly) > 0.0_dp .and. max(self%lx, self%ly) <= huge(1.0_dp))) then
+         text = 'the sides of a grid must be positive and finite'
+      else if (all(self%boundary /= [boundary_periodic, boundary_free])) then
+         text = 'the boundary of a grid must be boundary_periodic or boundary_free'
+      end if
+   end function fault
+
+   !> Does a field of this shape belong to the grid? The shape is [nx, rows], or [nx, 2, rows] for vectors.
+   pure logical function fits(self, extents)
+      class(grid_type), intent(in) :: self
+      integer, intent(in) :: extents(:)
+
+      if (size(extents) == 2) then
+         fits = all(extents == [self%nx, self%rows()])
+      else
+         fits = all(extents == [self%nx, 2, self%rows()])
+      end if
+   end function fits
 
    !> Share the rows with the other processes, if there are any.
    pure subroutine share_rows(self)

@@ -4,6 +4,7 @@
 !> the input file, checked and in lower case. The defaults are in `input_reference` or are derived by the modules
 !> `case_*`.
 module case_settings
+   use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
    use surface_settings, only : path_length, surface_settings_type, word_length
@@ -102,9 +103,20 @@ module case_settings
       type(solver_settings_type) :: solver
       type(output_settings_type) :: output
       character(:), allocatable :: warnings         !! one line each; empty if there are none
+   contains
+      procedure :: check_read
    end type case_type
 
 contains
+
+   !> Refuse a case that was not read, or whose reading has failed.
+   subroutine check_read(self, error)
+      class(case_type), intent(in) :: self
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+
+      if (allocated(error) .or. allocated(self%phases)) return
+      call fail(error, error_input, 'the case was not read, or reading it has failed')
+   end subroutine check_read
 
    !> Does some phase move or pull the road?
    pure function road_moves(phases) result(yes)

@@ -80,6 +80,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       logical, intent(in), optional :: movable      !! the road may be moved although no phase does so
 
+      call case%check_read(error)
+      if (allocated(error)) return
       self%case = case
       self%grid = case%grid
       call self%grid%share_rows()
@@ -158,6 +160,13 @@ contains
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
+      if (.not. allocated(self%state)) then
+         call fail(error, error_input, 'the simulation was not made, or it was destroyed')
+         return
+      else if (self%finished) then
+         call fail(error, error_input, 'the simulation is finished: there is no further row')
+         return
+      end if
       if (allocated(self%proposed)) deallocate (self%proposed)
       call self%stop%keep(self%state)
       call do_row(self, error)

@@ -14,6 +14,8 @@
 !> than the steps decay by the factor `fastest` = (1 + alpha)/(1 - alpha) per step. With the trapezoidal rule
 !> (alpha = 0) they would never decay once the block sticks.
 !>
+!> A state after an infinite time is one of rest: no inertia acts, and the kinetic energy is lost.
+!>
 !> a does not follow a jump of the acceleration at once. The first step after a jump of the load or of the speed
 !> therefore assumes a = a' (uniform acceleration). The error of this one step is of second order.
 !>
@@ -39,6 +41,7 @@ module block_motion
       real(dp) :: height = 0.0_dp              !! h, m
       real(dp) :: mass = 0.0_dp                !! m, kg/m2; 0: no inertia
       real(dp) :: area = 0.0_dp                !! of the cell lx by ly, m2
+      logical :: at_rest = .false.             !! the present step leads to the state after an infinite time
       logical :: fresh = .true.                !! a does not count in the next step
       real(dp) :: speed(2) = 0.0_dp            !! v, m/s
       real(dp) :: acceleration(2) = 0.0_dp     !! a, m/s2
@@ -46,15 +49,24 @@ module block_motion
       real(dp) :: lost = 0.0_dp                !! by the rule, J
       real(dp) :: inertia(2) = 0.0_dp          !! mean force on the mass in the last step, N
    contains
+      procedure :: has_inertia
       procedure :: inert
       procedure :: resistance
       procedure :: known
       procedure :: respond
       procedure :: finish
+      procedure :: come_to_rest
       procedure :: kinetic
    end type block_motion_type
 
 contains
+
+   !> Does a mass count in the present step?
+   pure logical function has_inertia(self)
+      class(block_motion_type), intent(in) :: self
+
+      has_inertia = self%mass > 0.0_dp .and. .not. self%at_rest
+   end function has_inertia
 
    !> Does the inertia of the block affect a step of length dt? There must be a mass, and dt must be positive.
    pure function inert(self, dt) result(yes)
@@ -62,7 +74,7 @@ contains
       real(dp), intent(in) :: dt               !! s
       logical :: yes
 
-      yes = self%mass > 0.0_dp .and. dt > 0.0_dp
+      yes = self%has_inertia() .and. dt > 0.0_dp
    end function inert
 
    !> The contribution of the mass to the modulus Q of the mean: f' = resistance U'/h - known, Pa.
@@ -113,7 +125,7 @@ contains
       if (self%inert(dt)) then
          height = q*height/(q + self%resistance(dt))
          shift = shift - height*self%known(displacement, motion, dt)
-      else if (self%mass > 0.0_dp) then
+      else if (self%has_inertia()) then
          height = 0.0_dp
          shift = shift - q*displacement
       end if
@@ -151,6 +163,19 @@ contains
       self%acceleration = after
       self%fresh = .false.
    end subroutine finish
+
+   !> End a step that leads to the state after an infinite time.
+   pure subroutine come_to_rest(self, energy)
+      class(block_motion_type), intent(inout) :: self
+      real(dp), intent(out) :: energy          !! kinetic energy that the block had, J
+
+      energy = self%kinetic()
+      self%work = self%work - energy
+      self%inertia = 0.0_dp
+      self%speed = 0.0_dp
+      self%acceleration = 0.0_dp
+      self%fresh = .true.
+   end subroutine come_to_rest
 
    !> Kinetic energy, J.
    pure function kinetic(self) result(energy)

@@ -55,6 +55,8 @@ contains
       logical, intent(in) :: overwrite             !! replace an unfinished run and its checkpoint
       type(error_type), allocatable, intent(out) :: error
 
+      call case%check_read(error)
+      if (allocated(error)) return
       call set_threads(case%solver%threads)
       self%warnings = ''
       self%rows = count_rows(case%phases)

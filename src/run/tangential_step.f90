@@ -29,7 +29,7 @@ module tangential_step
    use tangential_state, only : tangential_state_type
    use viscoelastic_energy, only : book_step
    use arm_state, only : commit_arms, new_products, past_traction, products_type
-   use zener, only : zener_type
+   use zener, only : step_relaxed, zener_type
    implicit none
    private
 
@@ -142,7 +142,8 @@ contains
       call past_traction(state%arms, material, self%past)
       self%past_mean = means(self, self%past)
       mean = 0.0_dp
-      if (state%block%mass > 0.0_dp) mean = means(self, state%displacement)
+      state%block%at_rest = material%kind == step_relaxed
+      if (state%block%has_inertia()) mean = means(self, state%displacement)
       call state%block%respond(self%q, mean, motion, dt, height, shift)
       where (pulled) shift = 0.0_dp
       !$omp parallel do default(none) shared(self, state, shift) private(c, j)
@@ -153,7 +154,7 @@ contains
       end do
       ! On a free grid there is no mean mode to set.
       if (self%grid%boundary == boundary_periodic) call self%operator%symbols%set_mean_compliance(height)
-      if (any(pulled) .and. state%block%mass > 0.0_dp) then
+      if (any(pulled) .and. state%block%has_inertia()) then
          call self%road_pull%place_mass(state%block, mean, dt)
          do c = 1, 2
             if (pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
@@ -363,7 +364,7 @@ contains
       type(rubbed_type) :: rubbed
       type(friction_fields_type) :: fields
       real(dp), allocatable, target :: weighed(:, :)
-      real(dp) :: carried(2), before(2), after(2)
+      real(dp) :: carried(2), before(2), after(2), kinetic
 
       if (.not. state%moved) then
          call book_rest(state, self%law, self%adhesive, pressure, gap, slope_x, slope_y)
@@ -372,7 +373,12 @@ contains
       call mark_idle(state, self%slip, idle_slip(self))
       products = new_products(material)
       carried = 0.0_dp
-      if (state%block%mass > 0.0_dp) then
+      if (state%block%at_rest) then
+         ! The rubber has dissipated the kinetic energy.
+         call state%block%come_to_rest(kinetic)
+         state%books%work = state%books%work + kinetic
+         state%books%dissipated = state%books%dissipated + kinetic
+      else if (state%block%has_inertia()) then
          before = means(self, state%displacement)
          after = means(self, self%trial)
          carried = means(self, state%traction) + self%past_mean - self%q*after/state%block%height

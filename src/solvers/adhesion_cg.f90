@@ -10,10 +10,12 @@ module adhesion_cg
    use adhesion_patch, only : adhesion_contact_type
    use adhesion_state, only : adhesion_problem_type, control_approach
    use finite_fields, only : reject_overflow
+   use contact_solver, only : check_normal_kernel
    use asperity_errors, only : error_input, error_type, fail
    use asperity_threads, only : thread_count
    use field_sums, only : field_maximum
    use kernels, only : kernel_type
+   use normal_state, only : fault_of_problem, normal_problem_type
    use asperity_precision, only : dp
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : grid_type
@@ -26,6 +28,7 @@ module adhesion_cg
    !> The solver with its operators and work fields, kept from step to step. A variable of this type must not be
    !> copied.
    type :: adhesion_solver_type
+      type(grid_type), private :: grid
       class(adhesion_method_type), allocatable, private :: method
    contains
       procedure :: solve
@@ -45,6 +48,9 @@ contains
       type(adhesion_thesis_type), allocatable :: thesis
       character(:), allocatable :: chosen
 
+      call check_normal_kernel(kernel, error)
+      if (allocated(error)) return
+      self%grid = grid
       chosen = 'fast'
       if (present(method)) chosen = method
       select case (chosen)
@@ -78,6 +84,10 @@ contains
       type(adhesion_contact_type) :: contact
       real(dp) :: started
 
+      ! The pressure may be negative here, unlike that of a normal contact without adhesion.
+      call outcome%refuse(fault_of_problem(normal_problem_type(modulus=problem%modulus, control=problem%control), &
+         self%grid, height, pressure, gap, past))
+      if (outcome%reason /= '') return
       started = omp_get_wtime()
       contact%problem = problem
       contact%height => height

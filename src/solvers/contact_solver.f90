@@ -2,7 +2,9 @@
 !>
 !> Module `normal_solvers` chooses a solver by the name of its method.
 module contact_solver
+   use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : convolution_type
+   use kernels, only : kernel_type
    use normal_state, only : normal_problem_type
    use asperity_precision, only : dp
    use regular_grid, only : grid_type
@@ -10,7 +12,7 @@ module contact_solver
    implicit none
    private
 
-   public :: contact_solver_type
+   public :: check_normal_kernel, contact_solver_type
 
    !> A solver with its operator, kept from step to step. A variable of this type must not be copied.
    type, abstract :: contact_solver_type
@@ -40,6 +42,15 @@ module contact_solver
    end interface
 
 contains
+
+   !> Refuse a kernel that is not a normal one.
+   subroutine check_normal_kernel(kernel, error)
+      type(kernel_type), intent(in) :: kernel
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+
+      if (allocated(error) .or. kernel%components == 1) return
+      call fail(error, error_input, 'a solver of normal contact needs a normal kernel')
+   end subroutine check_normal_kernel
 
    !> Free plans and memory.
    subroutine destroy(self)

@@ -59,7 +59,7 @@ module friction_cg
    use, intrinsic :: iso_fortran_env, only : int64
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
-   use solver_result, only : solver_result_type
+   use solver_result, only : reason_shape, reason_unmade, solver_result_type
    implicit none
    private
 
@@ -119,6 +119,10 @@ contains
       type(friction_fast_type), allocatable :: fast
       character(:), allocatable :: chosen
 
+      if (operator%components /= 2) then
+         call fail(error, error_input, 'the operator of a friction solver must be that of a tangential kernel')
+         return
+      end if
       self%periodic = grid%boundary == boundary_periodic
       self%length = max(grid%lx, grid%ly)
       self%compliance = operator%symbols%self_compliance(with_mean=.not. self%periodic)
@@ -151,6 +155,8 @@ contains
       type(friction_goal_type) :: goal
       integer(int64) :: coarse_ffts
 
+      call result%refuse(fault_of_friction(self, operator, law, fields))
+      if (result%reason /= '') return
       result%seconds = omp_get_wtime()
       result%required = max(self%tolerance, self%accepted)
       result%ffts = -operator%ffts - self%method%ffts
@@ -266,6 +272,24 @@ contains
          problem%mean_compliance = operator%symbols%mean_mode(1)
       call self%pull%attach(problem, operator, thick*self%length)
    end subroutine set_problem
+
+   !> What is wrong with the arguments of a solve; empty if nothing is.
+   function fault_of_friction(self, operator, law, fields) result(text)
+      class(friction_solver_type), intent(in) :: self
+      type(convolution_type), intent(in) :: operator
+      type(friction_law_type), intent(in) :: law
+      type(friction_fields_type), intent(in) :: fields
+      character(:), allocatable :: text
+
+      text = ''
+      if (.not. allocated(self%method)) then
+         text = reason_unmade
+      else if (.not. law%legal) then
+         text = 'the friction law is unknown, or one of its constants is missing or negative'
+      else if (.not. fields%fit_grid(operator%grid, law%slope_effect)) then
+         text = reason_shape
+      end if
+   end function fault_of_friction
 
    !> The reason why the solve ended.
    function reason(self, problem, result) result(text)

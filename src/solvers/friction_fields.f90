@@ -5,6 +5,7 @@
 module friction_fields
    use contact_runs, only : contact_runs_type
    use asperity_precision, only : dp, int8
+   use regular_grid, only : grid_type
    implicit none
    private
 
@@ -15,7 +16,7 @@ module friction_fields
       real(dp), pointer, contiguous :: pressure(:, :) => null()    !! [nx, rows] P, Pa
       real(dp), pointer, contiguous :: slope_x(:, :) => null()     !! [nx, rows] H_x; any size without slope
       real(dp), pointer, contiguous :: slope_y(:, :) => null()     !! [nx, rows] H_y
-      real(dp), pointer, contiguous :: drive(:, :, :) => null()    !! [nx, 2, rows] DX', m
+      real(dp), pointer, contiguous :: drive(:, :, :) => null()    !! [nx, 2, rows] DX' = Q DX, Pa m
       !> [nx, 2, rows] T_h, a given traction, Pa: r = DX' - A (T + T_h), without an additional product. It may
       !> be missing.
       real(dp), pointer, contiguous :: past(:, :, :) => null()
@@ -24,7 +25,7 @@ module friction_fields
       !> the share, and the states are only used to find cells that are likely to slip. It may be missing.
       real(dp), pointer, contiguous :: share(:, :) => null()
       real(dp), pointer, contiguous :: traction(:, :, :) => null() !! [nx, 2, rows] T, Pa; in: the start
-      real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, rows] out: r, everywhere, m
+      real(dp), pointer, contiguous :: slip(:, :, :) => null()     !! [nx, 2, rows] out: r, everywhere, Pa m
       !> If positive, `slip` times this is about r when a solve begins; 0 if nothing is known of r. Cells that
       !> are expected to slip far start on their bound, in the direction of their slip.
       real(dp) :: slip_unit = 0.0_dp
@@ -32,6 +33,8 @@ module friction_fields
       !> before: its traction starts on the bound. Without adhesion a point with P <= 0 is taken as
       !> open. Out: 0 open, 1 stick, 2 slip.
       integer(int8), pointer, contiguous :: contact(:, :) => null()
+   contains
+      procedure :: fit_grid
    end type friction_fields_type
 
    !> The fields of a solution. They contain the cells in contact alone (module `contact_runs`), and zeros behind them;
@@ -42,7 +45,7 @@ module friction_fields
       real(dp), allocatable :: share(:, :)         !! [width, rows] the caller's, if there are shares
       real(dp), allocatable :: traction(:, :, :)   !! [width, 2, rows] T, Pa
       real(dp), allocatable :: old(:, :, :)        !! [width, 2, rows] T before the last move, Pa
-      real(dp), allocatable :: slip(:, :, :)       !! [width, 2, rows] r, m
+      real(dp), allocatable :: slip(:, :, :)       !! [width, 2, rows] r, Pa m
       real(dp), allocatable :: tangent(:, :, :)    !! [width, 3, rows] direction of slip and weight
       integer(int8), allocatable :: contact(:, :)  !! [width, rows] state
    contains
@@ -50,6 +53,24 @@ module friction_fields
    end type friction_work_type
 
 contains
+
+   !> Are all fields there that a solve needs, with the shape of the grid?
+   pure logical function fit_grid(self, grid, slope)
+      class(friction_fields_type), intent(in) :: self
+      type(grid_type), intent(in) :: grid
+      logical, intent(in) :: slope                 !! the slopes are needed
+
+      fit_grid = associated(self%pressure) .and. associated(self%drive) .and. associated(self%traction) &
+         .and. associated(self%slip) .and. associated(self%contact)
+      if (slope) fit_grid = fit_grid .and. associated(self%slope_x) .and. associated(self%slope_y)
+      if (.not. fit_grid) return
+
+      fit_grid = grid%fits(shape(self%pressure)) .and. grid%fits(shape(self%contact)) &
+         .and. grid%fits(shape(self%drive)) .and. grid%fits(shape(self%traction)) .and. grid%fits(shape(self%slip))
+      if (slope) fit_grid = fit_grid .and. grid%fits(shape(self%slope_x)) .and. grid%fits(shape(self%slope_y))
+      if (associated(self%past)) fit_grid = fit_grid .and. grid%fits(shape(self%past))
+      if (associated(self%share)) fit_grid = fit_grid .and. grid%fits(shape(self%share))
+   end function fit_grid
 
    !> Give the fields the width of the runs.
    subroutine fit(self, rows, has_shares)

@@ -41,7 +41,7 @@
 !> until it is found.
 module normal_cg
    use coarse_fields, only : coarse_grid, coarsen, refine_pressure
-   use contact_solver, only : contact_solver_type
+   use contact_solver, only : check_normal_kernel, contact_solver_type
    use asperity_errors, only : error_type
    use field_sums, only : field_count, field_mean, field_rms
    use finite_fields, only : reject_overflow
@@ -50,8 +50,8 @@ module normal_cg
    use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
       phase_conjugate, phase_ended, phase_restart
    use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
-   use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, first_pressure, &
-      gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, remove_round_off, &
+   use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, fault_of_problem, &
+      first_pressure, gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, remove_round_off, &
       return_solution
    use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
@@ -102,6 +102,7 @@ contains
       self%grid = grid
       if (present(mixed)) self%mixed = mixed
       allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
+      call check_normal_kernel(kernel, error)
       call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
       if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
          memory=self%operator%spectrum_memory())
@@ -126,6 +127,9 @@ contains
       real(dp) :: cells, began, before, effort
       logical :: determined
 
+      level = 0.0_dp
+      call outcome%refuse(fault_of_problem(problem, self%grid, height, pressure, gap, past))
+      if (outcome%reason /= '') return
       call start_solve()
       do
          call measure_state()

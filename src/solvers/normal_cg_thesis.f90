@@ -5,12 +5,12 @@
 !> Negative pressures are set to 0, and the others are rescaled to the load. The contact is where P > 0 or the surfaces
 !> overlap. The stopping criterion is that of module `normal_cg`.
 module normal_cg_thesis
-   use contact_solver, only : contact_solver_type
+   use contact_solver, only : check_normal_kernel, contact_solver_type
    use asperity_errors, only : error_type
    use fft_conv, only : new_convolution
    use finite_fields, only : reject_overflow
-   use normal_state, only : control_pressure, evaluate_gap, first_pressure, gap_measure_type, measure_gap, &
-      narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined, remove_round_off, &
+   use normal_state, only : control_pressure, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, &
+      measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined, remove_round_off, &
       return_solution
    use omp_lib, only : omp_get_wtime
    use field_sums, only : cell_count, row_total
@@ -40,6 +40,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       self%grid = grid
+      call check_normal_kernel(kernel, error)
       call new_convolution(self%operator, grid, kernel, error)
    end subroutine new_thesis_solver
 
@@ -60,6 +61,9 @@ contains
       integer(int64) :: before
       logical :: determined
 
+      level = 0.0_dp
+      call outcome%refuse(fault_of_problem(problem, self%grid, height, pressure, gap, past))
+      if (outcome%reason /= '') return
       began = omp_get_wtime()
       before = self%operator%ffts
       allocate (residual(self%grid%nx, self%grid%rows()), source=0.0_dp)

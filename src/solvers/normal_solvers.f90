@@ -34,7 +34,7 @@ contains
          call new_thesis_solver(thesis, grid, kernel, error)
          call move_alloc(thesis, self)
       case default
-         call fail(error, error_input, 'there is no normal solver '''//method//'''')
+         call fail(error, error_input, 'method = '''//method//''': must be ''fast'' or ''thesis''')
       end select
    end subroutine new_contact_solver
 

@@ -5,12 +5,12 @@ module normal_state
    use asperity_precision, only : dp, pi
    use normal_sums, only : state_sums_type, total
    use projection, only : project_simplex
-   use solver_result, only : solver_result_type
+   use solver_result, only : reason_shape, reason_unmade, solver_result_type
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
 
-   public :: combine_measures, evaluate_gap, first_pressure, gap_measure_type, return_solution, measure_gap, &
+   public :: combine_measures, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, return_solution, measure_gap, &
       narrow_scale, normal_problem_type, prepare_problem, remove_round_off, row_measure
 
    character(*), parameter, public :: reason_converged = 'converged'
@@ -53,6 +53,31 @@ module normal_state
    end type gap_measure_type
 
 contains
+
+   !> What is wrong with the arguments of a solve; empty if nothing is.
+   pure function fault_of_problem(problem, grid, height, pressure, gap, past) result(text)
+      type(normal_problem_type), intent(in) :: problem
+      type(grid_type), intent(in) :: grid              !! of the solver
+      real(dp), intent(in) :: height(:, :), pressure(:, :), gap(:, :)
+      real(dp), intent(in), optional :: past(:, :)
+      character(:), allocatable :: text
+      logical :: fits
+
+      fits = grid%fits(shape(height)) .and. grid%fits(shape(pressure)) .and. grid%fits(shape(gap))
+      if (present(past)) fits = fits .and. grid%fits(shape(past))
+      text = ''
+      if (grid%nx < 1) then
+         text = reason_unmade
+      else if (.not. fits) then
+         text = reason_shape
+      else if (all(problem%control /= [control_pressure, control_approach])) then
+         text = 'control must be control_pressure or control_approach'
+      else if (.not. problem%modulus > 0.0_dp) then
+         text = 'the modulus must be positive'
+      else if (problem%control == control_pressure .and. .not. problem%target >= 0.0_dp) then
+         text = 'the prescribed pressure must not be negative'
+      end if
+   end function fault_of_problem
 
    !> Complete a problem for its fields. Find a height to which errors are compared and that round-off resolves (for a
    !> flat surface, the displacement under the load). Find out whether the pressure is determined: it is not if the

@@ -6,6 +6,10 @@ module solver_result
 
    public :: solver_result_type
 
+   ! Reasons for which a solve does not begin.
+   character(*), parameter, public :: reason_unmade = 'the solver was not made, or making it has failed'
+   character(*), parameter, public :: reason_shape = 'a field is missing or does not have the shape of the grid'
+
    !> The record of one solve.
    type :: solver_result_type
       integer :: iterations = 0                 !! iterations done
@@ -17,6 +21,21 @@ module solver_result
       logical :: stopped = .false.              !! stopped (module stop_watch): the fields have no meaning
       character(128) :: reason = ''             !! why the solver returned
       real(dp) :: seconds = 0.0_dp              !! wall time of the solve
+   contains
+      procedure :: refuse
    end type solver_result_type
+
+contains
+
+   !> Record that a solve has not begun, if there is a reason for that.
+   pure subroutine refuse(self, reason)
+      class(solver_result_type), intent(inout) :: self
+      character(*), intent(in) :: reason           !! what is wrong with the arguments; empty: nothing
+
+      if (reason == '') return
+      self%converged = .false.
+      self%residual = huge(1.0_dp)
+      self%reason = reason
+   end subroutine refuse
 
 end module solver_result

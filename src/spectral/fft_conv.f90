@@ -89,9 +89,11 @@ contains
       type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
       logical :: tabulated
 
+      call check_grid(grid, error)
       if (.not. allocated(error) .and. grid%boundary /= boundary_periodic .and. .not. associated(kernel%cell)) &
          call fail(error, error_input, 'this solid is for periodic boundaries only')
       call check_poisson(kernel, error)
+      if (allocated(error)) return
       call plan(self, shape_on_grid(grid, kernel%components, sharing), error, single, memory)
       if (allocated(error)) return
       self%grid = grid
@@ -106,6 +108,17 @@ contains
       end associate
       call self%symbols%finish()
    end subroutine new_convolution
+
+   !> Refuse a grid on which there is no operator.
+   subroutine check_grid(grid, error)
+      type(grid_type), intent(in) :: grid
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+      character(:), allocatable :: fault
+
+      if (allocated(error)) return
+      fault = grid%fault()
+      if (fault /= '') call fail(error, error_input, fault)
+   end subroutine check_grid
 
    !> Refuse a Poisson ratio that no elastic solid has.
    subroutine check_poisson(kernel, error)
@@ -123,7 +136,9 @@ contains
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
 
+      call check_grid(grid, error)
       call check_poisson(kernel, error)
+      if (allocated(error)) return
       call plan(self, shape_on_grid(grid, kernel%components), error)
       if (allocated(error)) return
       self%grid = grid

@@ -79,6 +79,10 @@ contains
       integer :: i, j, mirror_i, mirror_j
       real(dp) :: factor
 
+      if (.not. grid%fits(shape(psd))) then
+         call fail(error, error_input, 'the spectrum does not have the shape of its grid')
+         return
+      end if
       call transformed(grid, height, 0.0_dp, transform, error)
       if (allocated(error)) return
       factor = psd_factor(grid)

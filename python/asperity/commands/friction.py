@@ -159,7 +159,8 @@ def _add_rubber(parser: argparse.ArgumentParser) -> None:
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add the options for the runs and for the output."""
     parser.add_argument("--jobs", type=int, metavar="N",
-                        help="runs at a time (default: one per processor)")
+                        help="runs at a time (default: one per processor, and with --slurm as"
+                             " many as Slurm starts)")
     parser.add_argument("--slurm", metavar="OPTIONS",
                         help="submit the runs as a job array with these options of sbatch; the same"
                              " command gathers them later")
@@ -189,7 +190,7 @@ def _friction(chosen: argparse.Namespace) -> int:
     from ..curves.outputs import check_outputs, plan_code, write_output
     from ..curves.running import SubmittedError
     from ..curves.sources import compound_of, file_of_road, road_of
-    from ..runs.means import Means, share_of_processors
+    from ..runs.means import means_of
 
     _check_inputs(outputs, [*map(file_of_road, chosen.roads), chosen.material])
     options = {name: getattr(chosen, name) for name in ("unit", "size")
@@ -206,7 +207,7 @@ def _friction(chosen: argparse.Namespace) -> int:
                       coefficient=chosen.coefficient, slope_effect=chosen.slope,
                       angle=chosen.angle, tolerance=chosen.tolerance)
     plan = first_plan(plan, chosen.error, chosen.extend)
-    means = Means(*share_of_processors(chosen.jobs, 1), not chosen.no_resume, None, chosen.slurm)
+    means = means_of(chosen.jobs, 1, not chosen.no_resume, None, chosen.slurm)
     print(plan.summary(means.side_by_side), flush=True)
     most = min(MOST_PATCHES, plan.road.count or MOST_PATCHES)
     if chosen.error is not None and plan.patches < most:

@@ -99,14 +99,16 @@ class _Operator:
         target = displacements
         if periodic:
             target = target - target.mean(axis=mean_axes, keepdims=True)
+        # Squares of very small or large displacements would leave the range of the numbers.
+        unit = float(np.abs(target).max()) or 1.0
         found = np.zeros(self.shape)
-        residual = target.copy()
+        residual = target / unit
         direction = residual.copy()
         square = float(np.vdot(residual, residual))
-        limit = (tolerance**2) * float(np.vdot(target, target))
+        limit = tolerance**2 * square
         for _ in range(most):
             if square <= limit:
-                return found
+                return unit * found
             image = self._applied(direction)
             if periodic:
                 image -= image.mean(axis=mean_axes, keepdims=True)
@@ -116,9 +118,9 @@ class _Operator:
             old, square = square, float(np.vdot(residual, residual))
             direction = residual + (square / old) * direction
         if square <= limit:
-            return found
+            return unit * found
         raise NotConverged(f"inverse: the residual is {np.sqrt(square / limit) * tolerance:.3g}"
-                           f" after {most} iterations, allowed {tolerance:g}", found)
+                           f" after {most} iterations, allowed {tolerance:g}", unit * found)
 
     def __repr__(self) -> str:
         kind = "tangential" if self._components == 2 else "normal"

@@ -7,11 +7,14 @@ import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base.check import positive, whole
+from ..base.names import unknown_name
 from ..results.friction_curve import FrictionCurve
+from ..roads.measured import load
 from ..runs.means import Means, means_of
 from .gathering import gather
 from .plan import CurvePlan, plan_curve
@@ -141,6 +144,7 @@ def friction_curve(
         points that it concerns. The variables `warned` and `converged` contain the same.
     """
     means = means_of(jobs, threads, resume, executor, slurm)
+    _check_names(options)
     sources = list(roads) if isinstance(roads, list | tuple) else [roads]
     road = road_of(sources, cells=cells, side=side, join=join, short=short, outliers=outliers,
                    draw=draw, seed=seed, **options)
@@ -153,6 +157,15 @@ def friction_curve(
     for line in curve.warnings:
         warnings.warn(line, UserWarning, stacklevel=2)
     return curve.to_xarray()
+
+
+def _check_names(options: dict[str, Any]) -> None:
+    """Refuse options that neither `friction_curve` nor `asperity.surface.load` has."""
+    of_maps = tuple(signature(load).parameters)[1:]
+    own = tuple(signature(friction_curve).parameters)[:-1]
+    for name in options:
+        if name not in of_maps:
+            raise ValueError(unknown_name("option", name, (*own, *of_maps)))
 
 
 def first_plan(

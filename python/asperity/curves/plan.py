@@ -185,13 +185,13 @@ class CurvePlan:
         units = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
         return float(found[1]) * units[found[2]] if found else math.nan
 
-    def summary(self, side_by_side: int = 1) -> str:
+    def summary(self, side_by_side: int | None = 1) -> str:
         """Return a summary of the plan, one line per subject.
 
         Parameters
         ----------
-        side_by_side : int
-            Number of runs at a time.
+        side_by_side : int or None
+            Number of runs at a time; None where it is not known.
 
         Returns
         -------
@@ -212,16 +212,24 @@ class CurvePlan:
             f" {counted(self.pressure.size, 'pressure')} x"
             f" {counted(self.temperature.size, 'temperature')}",
             f"solves     {counted(self.solves, 'steady state')} in"
-            f" {counted(self.solves // self.speed.size, 'run')}, {side_by_side} at a time",
-            f"time       about {duration(_COMMAND + self.seconds() / side_by_side)}, if the"
-            " processors have nothing else to do",
-            f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB",
+            f" {counted(self.solves // self.speed.size, 'run')}"
+            + ("" if side_by_side is None else f", {side_by_side} at a time"),
+            *self._costs(side_by_side),
         ]
         maps = [f"{name}: {nx} x {ny} cells, {lx:.4g} x {ly:.4g} m"
                 for name, nx, ny, lx, ly in road.maps]
         lines[1:1] = [f"{head:11}{line}" for head, line in zip(
             ["maps", *[""] * len(maps)], maps, strict=False)]
         return "\n".join([*lines, *(f"note       {note}" for note in self.all_notes)])
+
+    def _costs(self, side_by_side: int | None) -> list[str]:
+        """Return the lines of the summary about time and memory."""
+        if side_by_side is None:
+            return [f"time       about {duration(self.seconds())} of one processor in all",
+                    f"memory     about {self.memory() / 1e6:.0f} MB for each run"]
+        return [f"time       about {duration(_COMMAND + self.seconds() / side_by_side)}, if the"
+                " processors have nothing else to do",
+                f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB"]
 
 
 def plan_curve(

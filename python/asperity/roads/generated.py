@@ -172,8 +172,8 @@ def shape(
     Raises
     ------
     ValueError
-        If a name, a number of cells or a length is not allowed, or the shape needs a value that is
-        not given.
+        If a name, a number of cells or a length is not allowed, the shape needs a value that is not
+        given, or a value is given that it does not have.
 
     Examples
     --------
@@ -186,8 +186,10 @@ def shape(
     given = {"radius": radius, "amplitude": amplitude, "wavelength": wavelength}
     missing = [f"{length}: is missing: {name!r} needs it, in m" for length in needed
                if given[length] is None]
-    if missing:
-        raise ValueError("\n".join(missing))
+    foreign = [f"{length} = {value!r}: does not belong to {name!r}"
+               for length, value in given.items() if value is not None and length not in needed]
+    if missing or foreign:
+        raise ValueError("\n".join(missing or foreign))
     return _make(nx, nx if ny is None else ny, lx, ly, boundary, name, radius=radius or 0.0,
                  amplitude=amplitude or 0.0, wavelength=wavelength or 0.0, centre_x=centre_x,
                  centre_y=centre_y)

@@ -499,9 +499,10 @@ class Prony:
         /
         """
         lines = [f"poisson = {poisson_ratio(poisson)!r}", f"shear_modulus = {self._g_inf!r}"]
-        if self._g.size:
-            lines.append(_wrapped("prony_g", self._g))
-            lines.append(_wrapped("prony_tau", self._tau))
+        acts = self._g > 0.0        # the program refuses arms without a modulus
+        if acts.any():
+            lines.append(_wrapped("prony_g", self._g[acts]))
+            lines.append(_wrapped("prony_tau", self._tau[acts]))
         if (temperature is None) != (wlf is None):
             raise ValueError("temperature and wlf: give both or none of them")
         if temperature is not None and wlf is not None:

@@ -274,13 +274,13 @@ class Groups(MutableSequence[Group]):
         """
         self._groups.insert(index, self._group(values))
 
-    def append(self, values: Mapping[str, Any] | None = None, **more: Any) -> None:
+    def append(self, values: Any = None, **more: Any) -> None:
         """Append a group.
 
         Parameters
         ----------
         values : Mapping, optional
-            Variables of the group.
+            Variables of the group; for a surface also a height map.
         **more
             Further variables as keywords.
 
@@ -289,7 +289,7 @@ class Groups(MutableSequence[Group]):
         ValueError
             If a variable does not exist or a value is not allowed.
         """
-        self.insert(len(self), {**(values or {}), **more})
+        self.insert(len(self), {**(values or {}), **more} if more or values is None else values)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Groups | list) and list(self) == list(other)

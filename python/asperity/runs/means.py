@@ -14,7 +14,7 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import NamedTuple
 
-from ..base.check import shown, whole
+from ..base.check import number_of_threads, shown, whole
 from ..base.files import write_text
 from .jobs import (
     UNSUITABLE,
@@ -40,8 +40,10 @@ class Means(NamedTuple):
 
     Attributes
     ----------
-    side_by_side, threads : int
-        Number of processes at a time on this machine, and number of threads of each.
+    side_by_side : int or None
+        Largest number of runs at a time. None means all that the executor or Slurm starts.
+    threads : int
+        Number of threads of each run.
     resume : bool
         Whether to continue from checkpoints.
     executor : concurrent.futures.Executor or None
@@ -50,7 +52,7 @@ class Means(NamedTuple):
         Options of ``sbatch``, if Slurm runs the jobs instead.
     """
 
-    side_by_side: int
+    side_by_side: int | None
     threads: int = 1
     resume: bool = True
     executor: Executor | None = None
@@ -94,12 +96,17 @@ def means_of(jobs: int | None, threads: int, resume: bool, executor: Executor | 
     Raises
     ------
     ValueError
-        If a number is not positive, there are fewer processors than `threads`, or the executor is
-        none.
+        If a number is not positive, there are fewer processors than `threads` for runs on this
+        machine, the executor is none, or both an executor and Slurm are given.
     """
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise ValueError(f"executor = {shown(executor)}: must be a concurrent.futures.Executor")
-    return Means(*share_of_processors(jobs, threads), resume, executor, slurm)
+    if executor is None and slurm is None:
+        return Means(*share_of_processors(jobs, threads), resume)
+    if executor is not None and slurm is not None:
+        raise ValueError("executor and slurm: give only one of them")
+    most = whole("jobs", jobs) if jobs is not None else None
+    return Means(most, number_of_threads("threads", threads), resume, executor, slurm)
 
 
 def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means) -> None:
@@ -119,13 +126,14 @@ def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means)
     if not waiting:
         progress.end()
     elif means.slurm is not None:
-        said = submit(waiting, folder, means.slurm, means.threads)
+        said = submit(waiting, folder, means.slurm, means.threads, means.side_by_side)
         for job in waiting:
             job.message = said
     elif means.executor is not None:
         _run_by_executor(waiting, means, progress)
     else:
-        run_here(waiting, program(), means.side_by_side, means.threads, means.resume, progress)
+        run_here(waiting, program(), means.side_by_side or 1, means.threads, means.resume,
+                 progress)
 
 
 # ---- executors -------------------------------------------------------------------------------
@@ -164,29 +172,36 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
 
 
 def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> None:
-    """Submit each job to the executor, and wait for all of them."""
-    assert means.executor is not None
-    asked: dict[Future[tuple[int, str]], Job] = {}
-    for job in waiting:
-        restart = means.resume and found_result(job) is not None
-        path = write_input(job).resolve()
-        job.started = time.monotonic()
-        asked[means.executor.submit(run_file, str(path), means.threads, restart)] = job
-    left = set(asked)
+    """Submit the jobs to the executor, as many at a time as allowed, and wait for all of them."""
+    ready = list(waiting)
+    running: dict[Future[tuple[int, str]], Job] = {}
+    most = means.side_by_side or len(ready)
     with Stops() as stops:
         try:
-            while left and not stops.asked:
-                done, left = concurrent.futures.wait(
-                    left, timeout=_POLL, return_when=concurrent.futures.FIRST_COMPLETED)
+            while (ready or running) and not stops.asked:
+                while ready and len(running) < most:
+                    job = ready.pop(0)
+                    running[_submit_to_executor(job, means)] = job
+                done, _ = concurrent.futures.wait(
+                    running, timeout=_POLL, return_when=concurrent.futures.FIRST_COMPLETED)
                 for future in done:
-                    job = asked[future]
+                    job = running.pop(future)
                     _take(job, future)
                     progress.done(job.name, job.message if job.status else None,
-                                  time.monotonic() - job.started, len(left))
+                                  time.monotonic() - job.started, len(ready) + len(running))
         finally:
-            for future in left:
+            for future in running:
                 future.cancel()
             progress.end()
+
+
+def _submit_to_executor(job: Job, means: Means) -> Future[tuple[int, str]]:
+    """Write the input of a job, and let the executor run it."""
+    assert means.executor is not None
+    restart = means.resume and found_result(job) is not None
+    path = write_input(job).resolve()
+    job.started = time.monotonic()
+    return means.executor.submit(run_file, str(path), means.threads, restart)
 
 
 def _take(job: Job, future: Future[tuple[int, str]]) -> None:
@@ -227,7 +242,7 @@ run --overwrite
 """
 
 
-def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
+def submit(waiting: list[Job], folder: Path, options: str, threads: int, most: int | None) -> str:
     """Submit jobs to Slurm as one job array, unless earlier ones are still in the queue.
 
     Parameters
@@ -240,6 +255,8 @@ def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
         Further options of ``sbatch``.
     threads : int
         Number of threads of each run.
+    most : int or None
+        Largest number of runs at a time; None means as many as Slurm starts.
 
     Returns
     -------
@@ -269,7 +286,8 @@ def submit(waiting: list[Job], folder: Path, options: str, threads: int) -> str:
         names=names, folder=shlex.quote(str(folder.resolve())), threads=threads,
         program=shlex.quote(program()),
         unsuitable=" | ".join(f'3:*"{words}"*' for words in UNSUITABLE)))
-    words = [command, "--parsable", f"--array=0-{len(waiting) - 1}", f"--cpus-per-task={threads}",
+    tasks = f"0-{len(waiting) - 1}" + ("" if most is None else f"%{most}")
+    words = [command, "--parsable", f"--array={tasks}", f"--cpus-per-task={threads}",
              f"--chdir={folder.resolve()}", *shlex.split(options), str(script.resolve())]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -40,6 +40,7 @@ _field = library.call("run_field")
 FIELDS = (*NORMAL_FIELDS, *TANGENTIAL_FIELDS, "height")
 
 _LOADS = ("pressure", "force", "displacement")
+_FOLLOWED = 1.5         # cells per step up to which the program does not warn
 
 
 class _CaseLike(Protocol):
@@ -164,10 +165,6 @@ class Simulation:
     (10, True)
     """
 
-    rows: int
-    shape: tuple[int, int]
-    finished: bool
-
     def __init__(self, case: str | os.PathLike[str] | _CaseLike, *,
                  threads: int | None = None) -> None:
         if threads is not None:
@@ -179,10 +176,25 @@ class Simulation:
         self._handle = int(handle)
         self._release = weakref.finalize(self, _close, self._handle)
         self._steered: dict[str, Any] = {}
-        self.rows, self.shape, self.finished = int(rows), (int(ny), int(nx)), False
+        self._rows, self._shape, self._finished = int(rows), (int(ny), int(nx)), False
         self._lengths = float(lx), float(ly)
-        self._started = self._failed = False
+        self._started = self._failed = self._watches_speed = False
         warn_of(notes)
+
+    @property
+    def finished(self) -> bool:
+        """Whether all rows have been computed."""
+        return self._finished
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of the case if nothing is changed."""
+        return self._rows
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Shape of the fields, (ny, nx)."""
+        return self._shape
 
     @property
     def fields(self) -> Mapping[str, NDArray[Any]]:
@@ -217,18 +229,37 @@ class Simulation:
             raise ValueError("the simulation is closed")
         if self.finished:
             raise ValueError("the simulation is finished: no row is left")
+        before = self._last() if self._watches_speed else None
         try:
             finished, notes = _step(self._handle)
         except NotConverged as error:
-            self._started = self._failed = self.finished = True
+            self._started = self._failed = self._finished = True
             raise NotConverged(str(error), self) from None
         except KeyboardInterrupt:
-            self._started, self.finished = map(bool, _progress(self._handle))
+            self._started, self._finished = map(bool, _progress(self._handle))
             raise
         self._started = True
-        self.finished = bool(finished)
+        self._finished = bool(finished)
         warn_of(notes)
-        return self._last()
+        row = self._last()
+        if before is not None:
+            self._watch_speed(before, row)
+        return row
+
+    def _watch_speed(self, before: Row, row: Row) -> None:
+        """Warn once if a velocity that was set moves the road too far in a step.
+
+        For the velocities of the input, the program checks this before the run.
+        """
+        (ny, nx), (lx, ly) = self._shape, self._lengths
+        cells = max(abs(row.road_x - before.road_x) * nx / lx,
+                    abs(row.road_y - before.road_y) * ny / ly if ny > 1 else 0.0)
+        if cells <= _FOLLOWED:
+            return
+        self._watches_speed = False
+        warnings.warn(f"the velocity that was set moves the road by {cells:.3g} cells in a step;"
+                      " the contact is well followed up to one cell per step:"
+                      f" dt = {(row.time - before.time) / cells:.3g} s", UserWarning, stacklevel=3)
 
     def _last(self) -> Row:
         """Return the last row, as the library has it."""
@@ -249,10 +280,11 @@ class Simulation:
     # --- steering ---------------------------------------------------------------------------
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set an attribute that exists: a misspelt load would otherwise be ignored silently."""
+        """Set a quantity that can be set: others would be ignored silently."""
         known = hasattr(type(self), name) or any(
             name in vars(kind).get("__annotations__", {}) for kind in type(self).__mro__)
-        if not (known or name.startswith("_")):
+        held = getattr(getattr(type(self), name, None), "fset", self) is None
+        if held or not (known or name.startswith("_")):
             raise AttributeError(unknown_name("quantity that can be set", name,
                                               (*_LOADS, "velocity", "temperature")))
         super().__setattr__(name, value)
@@ -302,13 +334,12 @@ class Simulation:
     @velocity.setter
     def velocity(self, value: tuple[float, float]) -> None:
         try:
-            pair = np.asarray(value, dtype=float)
+            along_x, along_y = (number("velocity", one) for one in value)
         except (TypeError, ValueError):
-            pair = np.empty(0)
-        if pair.shape != (2,) or not np.isfinite(pair).all():
             raise ValueError(f"velocity = {value!r}: must be two finite numbers, along x and y,"
-                             " in m/s")
-        self._set("velocity", pair[0], pair[1])
+                             " in m/s") from None
+        self._watches_speed = True
+        self._set("velocity", along_x, along_y)
 
     @property
     def temperature(self) -> float | None:
@@ -409,7 +440,7 @@ class Simulation:
             except (OSError, ValueError) as error:
                 message = str(error).replace(str(Path(folder) / "state.checkpoint.h5"), str(path))
                 raise type(error)(message) from None
-        self._started, self.finished = True, bool(finished)
+        self._started, self._finished = True, bool(finished)
         return self
 
     @classmethod
@@ -419,7 +450,7 @@ class Simulation:
 
     def close(self) -> None:
         """Free the memory. Later calls raise ValueError, because the simulation is closed."""
-        self.finished = True
+        self._finished = True
         self._release()
 
     def __enter__(self) -> Simulation:

@@ -75,10 +75,11 @@ def sweep(
         Folder of the results. The default is ``NAME_sweep`` beside the input NAME.nml, or ``sweep``
         in the current folder for a case without a file.
     jobs : int or None
-        Number of runs at a time, but never more than the processors allow with `threads` each. None
-        means as many as they allow.
+        Largest number of runs at a time. On this machine there are never more than the processors
+        allow with `threads` each, and None means as many as they allow. With `executor` and
+        `slurm`, None means as many as these start.
     threads : int
-        Number of threads of each run, at most the number of processors.
+        Number of threads of each run. On this machine at most the number of processors.
     resume : bool
         Reuse complete results of the same input. With False all cases are run again.
     measure : callable or 'steady', optional
@@ -97,8 +98,8 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Executor that runs the cases instead of processes of this machine, with one call each:
         Dask's ``client.get_executor()``, mpi4py's ``MPICommExecutor`` or any other. Its workers
-        must have access to `folder`; `jobs` has no effect. After Ctrl-C waiting cases are
-        cancelled, and running ones are completed.
+        must have access to `folder`. After Ctrl-C waiting cases are cancelled, and running ones
+        are completed.
     slurm : str, optional
         Options of ``sbatch``, such as "--time=1:00:00 --partition=short". The cases are submitted
         as one job array that fills `folder`. Until they are complete, the table lists them as
@@ -134,9 +135,7 @@ def sweep(
     [0.203125, 0.390625, 1.0]
     """
     choice("errors", errors, ("raise", "keep"))
-    if isinstance(measure, str):
-        choice("measure", measure, ("steady",))
-    elif measure is not None and not callable(measure):
+    if not (measure is None or callable(measure) or measure == "steady"):
         raise ValueError(f"measure = {shown(measure)}: must be a function of a run, or 'steady'")
     means = means_of(jobs, threads, resume, executor, slurm)
     case = base.copy() if isinstance(base, Case) else Case.read(base)
@@ -242,6 +241,9 @@ Say phase[1].velocity_y to phase[2].velocity_y
         raise ValueError(f"{name!r}: must be a name such as 'solver.tolerance' or"
                          " 'phase[2].velocity_x'")
     group, number, variable = found.groups()
+    if (group, variable) == ("output", "file"):
+        raise ValueError("output.file: the results of a sweep are named after its values; `folder`"
+                         " chooses their place")
     groups = case[group]  # the error for an unknown name suggests the nearest one
     entry = namelists.table()[group]
     Case.help(f"{group}.{variable}")
