@@ -146,9 +146,13 @@ def check_coming_from(folder, out):
 
 
 def check_fortran(folder, out):
-    converged, peak, hertz = out.split()
+    sphere, *rows = filter(None, out.splitlines())
+    converged, peak, hertz = sphere.split()
     assert converged == "T"
     assert float(peak) == pytest.approx(float(hertz), rel=1e-3)
+    friction = [float(row.split()[1]) for row in rows]
+    assert len(rows) == 41 and friction[0] == 0.0
+    assert friction[-1] == pytest.approx(0.5, abs=0.05)     # Coulomb's, on slopes of up to 0.063
 
 
 def check_driving(folder, out):

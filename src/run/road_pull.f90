@@ -78,7 +78,7 @@ contains
       real(dp), intent(in) :: beside(2)               !! mean force on the slopes of the road that is not in T, Pa
 
       pull%traction = self%force - beside
-      if (block%has_inertia()) then
+      if (block%mass > 0.0_dp) then
          pull%offset = self%mass_offset
          pull%mass_compliance = self%mass_compliance
       else
@@ -94,7 +94,7 @@ contains
       type(block_motion_type), intent(in) :: block
       real(dp), intent(in) :: past(2)                 !! mean of T_h, Pa
 
-      if (block%has_inertia()) pull%offset = pull%offset + block%height*(pull%traction + past)
+      if (block%mass > 0.0_dp) pull%offset = pull%offset + block%height*(pull%traction + past)
       where (pull%along) self%motion = pull%offset/self%q
       self%slides_off = pull%slides_off
    end subroutine find_motion

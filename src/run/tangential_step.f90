@@ -154,7 +154,7 @@ contains
       end do
       ! On a free grid there is no mean mode to set.
       if (self%grid%boundary == boundary_periodic) call self%operator%symbols%set_mean_compliance(height)
-      if (any(pulled) .and. state%block%has_inertia()) then
+      if (any(pulled) .and. state%block%mass > 0.0_dp) then
          call self%road_pull%place_mass(state%block, mean, dt)
          do c = 1, 2
             if (pulled(c)) call self%operator%symbols%set_mean_mode(c, 0.0_dp)
