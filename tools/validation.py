@@ -410,7 +410,8 @@ def adhesion() -> Chapter:
 
     square = {t: computed(t, "maugis_dugdale") for t in tabor[tabor <= 1.0]}
     smooth = {t: computed(t, "exponential") for t in tabor}
-    rows = [Row(f"contact radius, Maugis-Dugdale, Tabor parameter {t:g}", a * 1e3, known(t) * 1e3, "mm")
+    rows = [Row(f"contact radius, Maugis-Dugdale, Tabor parameter {t:g}", a * 1e3, known(t) * 1e3,
+                "mm")
             for t, a in square.items()]
     rows.append(Row("contact radius, exponential, Tabor parameter 5, JKR", smooth[5.0] * 1e3,
                     jkr * 1e3, "mm"))
