@@ -4,6 +4,7 @@ module operator_handles
    use asperity_errors, only : error_input, error_type, fail
    use fft_conv, only : convolution_type
    use asperity_precision, only : dp
+   use text_tools, only : to_text
    implicit none
    private
 
@@ -46,7 +47,7 @@ contains
          operator => slots(i)%operator
          return
       end do
-      call fail(error, error_input, 'too many operators are open')
+      call fail(error, error_input, 'more than '//to_text(most)//' operators are in use at a time')
    end subroutine new_operator
 
    !> The operator of a handle that must be in use.

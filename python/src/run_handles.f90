@@ -5,6 +5,7 @@ module run_handles
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
    use asperity_simulation, only : simulation_type
+   use text_tools, only : to_text
    implicit none
    private
 
@@ -55,7 +56,8 @@ contains
       handle = 0
       slot => slot_of(0)
       if (.not. associated(slot)) then
-         call fail(error, error_input, 'too many '//what//' are open: close some')
+         call fail(error, error_input, 'more than '//to_text(size(slots))//' runs and simulations are open at a time: '// &
+            'close some '//what)
          return
       end if
       last_handle = last_handle + 1

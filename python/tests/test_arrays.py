@@ -23,6 +23,16 @@ def solved(height, lx, ly, **load):
     return asperity.solve_normal(height, lx, ly, 2 * 1e6 / 0.5, tolerance=1e-8, **load)
 
 
+def test_a_case_takes_a_measured_surface(tmp_path):
+    path = asperity.surface.save(tmp_path / "map.h5", wave(), 1.2e-3, 0.8e-3, boundary="periodic")
+    measured = asperity.surface.load(path)
+    case = asperity.Case(surface=measured, material=MATERIAL, phase=dict(pressure=3e3))
+    array = asperity.Case(surface=wave() - wave().mean(), grid=dict(lx=1.2e-3, ly=0.8e-3),
+                          material=MATERIAL, phase=dict(pressure=3e3))
+    rows = [asperity.Simulation(one).advance() for one in (case, array)]
+    assert rows[0].contact_area == rows[1].contact_area > 0.0
+
+
 def test_a_list_of_surfaces_takes_arrays():
     case = asperity.Case(surface=wave(), grid=dict(lx=1.2e-3, ly=0.8e-3), material=MATERIAL,
                          phase=dict(pressure=3e3))

@@ -329,6 +329,15 @@ def test_fields_keep_their_simulation():
         gc.enable()
 
 
+def test_the_number_of_open_simulations_is_limited():
+    small = (BASE + SLIDE).replace("nx = 32, ny = 24", "nx = 16, ny = 12")
+    gc.collect()
+    with pytest.raises(ValueError, match="more than 128 runs and simulations are open at a time"):
+        _ = [asperity.Simulation(small) for _ in range(129)]
+    gc.collect()
+    asperity.Simulation(small).advance()
+
+
 def test_many_simulations_one_after_another():
     for _ in range(200):
         asperity.Simulation(BASE + "&phase pressure = 1e5 /\n")

@@ -1,4 +1,4 @@
-"""Files for height maps that are given as arrays or SurfaceTopography objects.
+"""Files for height maps that are given as arrays, measured surfaces or SurfaceTopography objects.
 
 The program reads heights from HDF5 files. A map that is given as an array is therefore written to a
 temporary folder, which is removed when the process ends. The name of the file is a checksum of its
@@ -40,8 +40,9 @@ _held: dict[Path, HeldMap] = {}
 
 
 def is_map(value: object) -> bool:
-    """Return whether a value is an array or a topography, and not the variables of a group."""
-    return isinstance(value, np.ndarray) or _is_topography(value) or _is_list_of_rows(value)
+    """Return whether a value is a height map, and not the variables of a group."""
+    return (isinstance(value, np.ndarray) or _is_topography(value) or _is_measured(value)
+            or _is_list_of_rows(value))
 
 
 def _is_list_of_rows(value: object) -> bool:
@@ -54,8 +55,15 @@ def _is_topography(value: object) -> bool:
     return callable(getattr(value, "heights", None)) and hasattr(value, "physical_sizes")
 
 
+def _is_measured(value: object) -> bool:
+    """Return whether a value is a `MeasuredSurface`, whose module is loaded on first use only."""
+    return all(hasattr(value, name) for name in ("height", "lx", "ly", "periodic"))
+
+
 def _map_of(value: Any, name: str = "surface") -> HeldMap:
-    """Return an array or a topography as a map in metres, in which summits are maxima."""
+    """Return a height map in metres, in which summits are maxima."""
+    if _is_measured(value):
+        return HeldMap(_with_cells(value.height, name), value.lx, value.ly, value.periodic)
     if not _is_topography(value):
         return HeldMap(_with_cells(library.height_map(value, name), name), None, None, None)
     if not getattr(value, "is_uniform", True):

@@ -56,8 +56,9 @@ class Case(CaseGroups):
         ``phase``. Values may be NumPy numbers and arrays.
 
         A surface may also be a height map: an array of shape (ny, nx) in m, or nested lists, in
-        which summits are maxima, or a topography of SurfaceTopography. The grid then gets its
-        numbers of cells, and the lengths of a topography, unless the grid has values of its own.
+        which summits are maxima, a `MeasuredSurface` of `asperity.surface.load`, or a topography of
+        SurfaceTopography. The grid then gets its numbers of cells and, except from an array, its
+        lengths, unless the grid has values of its own.
         The map is stored in a temporary file; `write` and `run` copy it beside the input or the
         result.
 

@@ -83,7 +83,8 @@ class Group(MutableMapping[str, Any]):
         object.__setattr__(self, "_entry", entry_of(name))
         object.__setattr__(self, "_values", {})
         if values is not None and not isinstance(values, Mapping):
-            map_too = ", or a height map: an array of shape (ny, nx)" * (name == "surface")
+            map_too = (", or a height map: an array of shape (ny, nx), a MeasuredSurface or a"
+                       " topography" * (name == "surface"))
             raise ValueError(f"&{name}: {shown(values)}: must be a dict of variables{map_too}")
         if isinstance(values, Group) and values._entry is self._entry:
             self._values.update({name: list(value) if isinstance(value, list) else value
