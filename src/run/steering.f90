@@ -79,7 +79,9 @@ contains
          factor = shift(temperature)/shift(start_temperature)
          if (.not. (factor > 1.0e-100_dp .and. factor < 1.0e100_dp)) then
             call fail(error, error_input, 'temperature = '//to_text(temperature)// &
-               ': shifts the relaxation times by a factor of '//to_text(factor))
+               ': must shift the relaxation times by a factor between 1e-100 and 1e100; the factor grows without '// &
+               'limit towards reference_temperature - wlf_c2 = '// &
+               to_text(material%reference_temperature - material%wlf_c2))
             return
          end if
          material%temperature = temperature

@@ -74,14 +74,14 @@ def friction_curve(
 
     Parameters
     ----------
-    roads : str, path, MeasuredSurface, Spectrum, or a list of them
+    roads : str, path, MeasuredSurface, asperity.roads.spectra.Spectrum, or a list of them
         Measured maps in any format that `asperity.surface.load` reads; ``"spectrum:FILE"``;
         ``"self_affine:hurst=0.8,wavelength_long=1e-3,wavelength_short=1e-5,rms_slope=0.2"``;
         profiles, which stand for isotropic roads.
-    material : str, Path, Prony or Compound
+    material : str, Path, Prony or asperity.rubber.compound.Compound
         A namelist with ``&material``, a DMA table, or a Prony series.
     speeds, pressures : array_like
-        Speeds, m/s, and pressures, Pa.
+        Speeds, m/s, and pressures, Pa. The result has them in rising order.
     temperatures : array_like, optional
         Temperatures, C; by default that of the rubber.
     coefficient : float
