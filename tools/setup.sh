@@ -40,8 +40,8 @@ fi
 PATH=$PWD/.venv/bin:$PATH
 export PATH
 
-# What is built here is for this machine: the vector registers of 256 bits are used, where it has them. Products and
-# sums stay separate operations, with the rounding of other machines. ASPERITY_PORTABLE=1 builds for all processors.
+# What is built here is for this machine: where its processor has vector registers of 256 bits, they are used. Products
+# and sums stay separate operations and round as on other machines. ASPERITY_PORTABLE=1 builds for all processors.
 for name in FFLAGS FPM_FFLAGS; do
   eval "flags=\${$name:-}"
   flags=$(printf '%s' "$flags" | sed 's/ *-mavx2//g')

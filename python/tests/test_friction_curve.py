@@ -486,6 +486,10 @@ def test_a_job_array_fills_the_folder(tmp_path, monkeypatch):
         (tools / name).chmod(stat.S_IRWXU)
     monkeypatch.setenv("PATH", f"{tools}{os.pathsep}{os.environ['PATH']}")
     plan = small_plan()
+    summary = plan.summary(None)        # Slurm decides how many runs there are at a time
+    assert "at a time" not in summary
+    assert re.search(r"^time +about \d+ s of one processor in all$", summary, re.MULTILINE)
+    assert re.search(r"^memory +about \d+ MB for each run$", summary, re.MULTILINE)
     slurm = Means(None, slurm="--time=1:00:00 --partition='short jobs'")
     with pytest.raises(SubmittedError, match="2 runs submitted to Slurm as job 4711"):
         run_curve(plan, tmp_path / "runs", slurm, quiet=True)

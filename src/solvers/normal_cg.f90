@@ -51,8 +51,8 @@ module normal_cg
       phase_conjugate, phase_ended, phase_restart
    use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
    use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, fault_of_problem, &
-      first_pressure, gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, remove_round_off, &
-      return_solution
+      first_pressure, gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, &
+      remove_round_off, return_solution
    use normal_sums, only : state_sums_type, total
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type

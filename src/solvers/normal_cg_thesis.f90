@@ -10,8 +10,8 @@ module normal_cg_thesis
    use fft_conv, only : new_convolution
    use finite_fields, only : reject_overflow
    use normal_state, only : control_pressure, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, &
-      measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined, remove_round_off, &
-      return_solution
+      measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_iterations, reason_undetermined, &
+      remove_round_off, return_solution
    use omp_lib, only : omp_get_wtime
    use field_sums, only : cell_count, row_total
    use kernels, only : kernel_type

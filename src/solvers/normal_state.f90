@@ -10,8 +10,8 @@ module normal_state
    implicit none
    private
 
-   public :: combine_measures, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, return_solution, measure_gap, &
-      narrow_scale, normal_problem_type, prepare_problem, remove_round_off, row_measure
+   public :: combine_measures, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, return_solution, &
+      measure_gap, narrow_scale, normal_problem_type, prepare_problem, remove_round_off, row_measure
 
    character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'

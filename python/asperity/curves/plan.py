@@ -225,7 +225,8 @@ class CurvePlan:
     def _costs(self, side_by_side: int | None) -> list[str]:
         """Return the lines of the summary about time and memory."""
         if side_by_side is None:
-            return [f"time       about {duration(self.seconds())} of one processor in all",
+            alone = duration(max(self.seconds(), 1.0))
+            return [f"time       about {alone} of one processor in all",
                     f"memory     about {self.memory() / 1e6:.0f} MB for each run"]
         return [f"time       about {duration(_COMMAND + self.seconds() / side_by_side)}, if the"
                 " processors have nothing else to do",

@@ -63,7 +63,8 @@ def _is_measured(value: object) -> bool:
 def _map_of(value: Any, name: str = "surface") -> HeldMap:
     """Return a height map in metres, in which summits are maxima."""
     if _is_measured(value):
-        return HeldMap(_with_cells(value.height, name), value.lx, value.ly, value.periodic)
+        height = _with_cells(library.height_map(value.height, name), name)
+        return HeldMap(height, value.lx, value.ly, value.periodic)
     if not _is_topography(value):
         return HeldMap(_with_cells(library.height_map(value, name), name), None, None, None)
     if not getattr(value, "is_uniform", True):
