@@ -5,6 +5,7 @@ module test_wrong_arguments
       height_psd, kernel_type, new_adhesion_potential, new_adhesion_solver, new_convolution, new_friction_law, &
       new_friction_solver, new_grid, new_normal_solver, new_simulation, normal_half_space, normal_problem_type, &
       normal_solver_type, parse_case, run_type, simulation_type, solver_result_type, tangential_half_space
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_fortran_env, only : int8
    use check, only : begin_suite, check_error, check_no_error, check_order, check_that, selected
    implicit none
@@ -118,12 +119,14 @@ contains
       call solver%destroy()
    end subroutine adhesion_solver_refuses_fields_of_another_shape
 
-   !> Missing fields, fields of another shape, an unknown law, and constants that are missing or negative.
+   !> Fields that are missing, of another shape or not numbers; laws that are unknown, and constants and tables that
+   !> are missing or impossible.
    subroutine friction_solver_refuses_fields_and_laws()
       type(friction_solver_type) :: solver
       type(convolution_type) :: operator
       type(friction_fields_type) :: fields
-      type(friction_law_type) :: laws(4)
+      type(friction_law_type) :: laws(8)
+      real(dp) :: table(2, 2)
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
       real(dp), target :: pressure(nx, ny), drive(nx, 2, ny), traction(nx, 2, ny), slip(nx, 2, ny), small(2, 2)
@@ -149,11 +152,21 @@ contains
       call check_refused(outcome, of_shape)
 
       fields%pressure => pressure
+      drive(3, 2, 5) = ieee_value(1.0_dp, ieee_quiet_nan)
+      call solver%solve(operator, laws(1), fields, outcome)
+      call check_that(.not. outcome%converged .and. outcome%reason == 'not a number', 'drive that is not a number')
+      call check_that(ieee_is_nan(outcome%residual), 'residual of a drive that is not a number')
+      drive(3, 2, 5) = 1e-3_dp
       laws(1) = new_friction_law('constant shear', 0.5_dp, 1.0_dp, 0.0_dp, .false., .true.)
       laws(2) = new_friction_law('coulomb', -0.5_dp, 0.0_dp, 0.0_dp, .false., .true.)
       laws(3) = new_friction_law('coulomb_orowan', 0.5_dp, -1.0_dp, 0.0_dp, .false., .true.)
       laws(4) = new_friction_law('table', 0.5_dp, 1.0_dp, 0.0_dp, .false., .true.)
-      do k = 1, 4
+      table = reshape([0.0_dp, 1.0_dp, 0.0_dp, 0.5_dp], [2, 2])
+      laws(5) = new_friction_law('table', 0.5_dp, 1.0_dp, 0.0_dp, .true., .true., table)
+      laws(6) = new_friction_law('table', 0.5_dp, 1.0_dp, 0.0_dp, .false., .true., table(2:1:-1, :))
+      laws(7) = new_friction_law('table', 0.5_dp, 1.0_dp, 0.0_dp, .false., .true., -table)
+      laws(8) = new_friction_law('table', 0.5_dp, 1.0_dp, 0.0_dp, .false., .true., table(:, :1))
+      do k = 1, size(laws)
          call solver%solve(operator, laws(k), fields, outcome)
          call check_refused(outcome, 'friction law')
       end do

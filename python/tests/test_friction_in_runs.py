@@ -367,3 +367,23 @@ def test_elastic_contact_sticks_when_the_road_has_stopped(law, boundary):
     rows = list(asperity.Simulation(case))
     assert [row.stick_area for row in rows[1:4]] == [0, 0, 0]
     assert [row.stick_area for row in rows[4:]] == [row.contact_area for row in rows[4:]]
+
+
+@pytest.mark.parametrize("law", [
+    {"law": "coulomb", "coefficient": 0.5}, {"law": "constant_shear", "shear_strength": 2e4}])
+def test_the_loss_does_not_depend_on_how_many_periods_are_computed(law):
+    """Cells begin to slip within the step; each of four periods loses a quarter of the energy."""
+    loss = []
+    for copies in (1, 2):
+        case = asperity.Case(
+            grid={"nx": 32 * copies, "ny": 18 * copies, "lx": 1e-3 * copies,
+                  "ly": 1e-3 * copies / np.sqrt(3)},
+            surface={"shape": "hexagonal_wave", "wavelength": 1e-3, "amplitude": 1e-5},
+            material={"shear_modulus": 1e6, "thickness": 2e-4}, friction=law,
+            phase=[{"pressure": 5e4}, {"duration": 1.0, "steps": 1, "velocity_x": 2e-5}],
+            solver={"tolerance": 1e-9})
+        rows = list(asperity.Simulation(case))
+        assert rows[-1].stick_area < rows[0].contact_area
+        loss.append(rows[-1].dissipated_friction / copies**2)
+    assert loss[0] > 0
+    assert loss[1] == pytest.approx(loss[0], rel=1e-6)

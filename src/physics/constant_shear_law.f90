@@ -22,6 +22,7 @@ contains
 
       self%bare_strength = strength
       self%variables(1) = 'shear_strength'
+      self%legal = strength >= 0.0_dp
    end function new_constant_shear_law
 
    !> sigma_max in a row.

@@ -22,6 +22,7 @@ contains
 
       self%coefficient = coefficient
       self%variables(1) = 'coefficient'
+      self%legal = coefficient >= 0.0_dp
    end function new_coulomb_law
 
    !> mu N of a row.

@@ -23,6 +23,7 @@ contains
       self%coefficient = coefficient
       self%strength_beside = strength
       self%variables = [character(16) :: 'coefficient', 'shear_strength']
+      self%legal = coefficient >= 0.0_dp .and. strength >= 0.0_dp
    end function new_coulomb_orowan_law
 
 end module coulomb_orowan_law

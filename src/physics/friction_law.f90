@@ -29,7 +29,7 @@
 module friction_law
    use asperity_precision, only : dp, int8
    use shear_law, only : shear_law_type
-   use shear_laws, only : choose_shear_law, shear_law_words
+   use shear_laws, only : choose_shear_law
    implicit none
    private
 
@@ -47,7 +47,7 @@ module friction_law
       real(dp) :: adhesive_pressure = 0.0_dp     !! p_a = e'(0), Pa; 0 without adhesion
       logical :: slope_effect = .false.          !! the slope of the road counts
       logical :: physical_slip = .true.          !! direction of slip: physical, or that of the thesis
-      logical :: legal = .false.                 !! the name is known, and no constant is missing or negative
+      logical :: legal = .false.                 !! the law of the name is legal here, and p_a is not negative
    contains
       procedure :: normal_traction
       procedure :: bound_ratio
@@ -81,10 +81,7 @@ contains
       self%adhesive_pressure = adhesive_pressure
       self%slope_effect = slope
       self%physical_slip = physical_slip
-      self%legal = index(shear_law_words, "'"//name//"'") > 0 .and. adhesive_pressure >= 0.0_dp
-      if (self%shear%uses('coefficient')) self%legal = self%legal .and. coefficient >= 0.0_dp
-      if (self%shear%uses('shear_strength')) self%legal = self%legal .and. shear_strength >= 0.0_dp
-      if (self%shear%uses('table_strength')) self%legal = self%legal .and. present(table)
+      self%legal = self%shear%legal .and. adhesive_pressure >= 0.0_dp .and. (self%shear%on_slopes .or. .not. slope)
    end function new_friction_law
 
    !> T*, the tangential traction of a purely normal reaction.

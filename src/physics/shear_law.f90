@@ -30,6 +30,10 @@ module shear_law
       real(dp) :: strength_beside = -1.0_dp
       !> Variables of the group &friction that the law needs.
       character(16) :: variables(2) = ''
+      !> The law may act on the slope of the road: the bound is linear in the pressure, or `strength_beside`.
+      logical :: on_slopes = .true.
+      !> The name is known, and no constant is missing or outside its range. Solvers refuse other laws.
+      logical :: legal = .false.
    contains
       procedure(forces_of_row), deferred :: forces
       procedure(force_of_cell), deferred :: force

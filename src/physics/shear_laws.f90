@@ -1,5 +1,6 @@
 !> The friction laws by name: the only place that knows all of them.
 module shear_laws
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use asperity_precision, only : dp
    use constant_shear_law, only : new_constant_shear_law
    use coulomb_law, only : new_coulomb_law
@@ -20,7 +21,7 @@ module shear_laws
 
 contains
 
-   !> Make a law from its name and constants.
+   !> Make a law from its name and constants. An unknown name gives a law that is not legal, whose bounds are not numbers.
    subroutine choose_shear_law(name, coefficient, strength, law, table)
       character(*), intent(in) :: name             !! one of the words; 'none' makes Coulomb's law, which is not used
       real(dp), intent(in) :: coefficient          !! mu >= 0
@@ -35,8 +36,10 @@ contains
          allocate (law, source=new_coulomb_orowan_law(coefficient, strength))
       case ('table')
          allocate (law, source=new_table_law(table))
-      case default
+      case ('coulomb', 'none')
          allocate (law, source=new_coulomb_law(coefficient))
+      case default
+         allocate (law, source=new_coulomb_law(ieee_value(coefficient, ieee_quiet_nan)))
       end select
    end subroutine choose_shear_law
 

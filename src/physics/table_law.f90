@@ -25,7 +25,8 @@ module table_law
 
 contains
 
-   !> Make the law. Without a table the law has no friction, but still names the variables that it needs.
+   !> Make the law. Without a table, or with an impossible one, it has no friction and is not legal, but still names the
+   !> variables that it needs.
    function new_table_law(table) result(self)
       !> [n, 2] Pressures, Pa, that begin at 0 and rise, and the bounds there, Pa, >= 0; two points or more.
       real(dp), intent(in), optional :: table(:, :)
@@ -33,8 +34,11 @@ contains
       integer :: k, n
 
       self%variables = [character(16) :: 'table_pressure', 'table_strength']
+      self%on_slopes = .false.
       allocate (self%points(3, 1), source=0.0_dp)
       if (.not. present(table)) return
+      self%legal = describes_bound(table)
+      if (.not. self%legal) return
       n = size(table, 1)
       deallocate (self%points)
       allocate (self%points(3, n))
@@ -47,6 +51,19 @@ contains
       self%coefficient = max(self%points(3, 1), 0.0_dp)
       self%bare_strength = table(1, 2)
    end function new_table_law
+
+   !> Do the numbers describe a bound?
+   pure function describes_bound(table) result(yes)
+      real(dp), intent(in) :: table(:, :)
+      logical :: yes
+      integer :: n
+
+      n = size(table, 1)
+      yes = n >= 2 .and. size(table, 2) == 2
+      if (.not. yes) return
+      yes = .not. abs(table(1, 1)) > 0.0_dp .and. all(table(2:, 1) > table(:n - 1, 1)) .and. all(table(:, 2) >= 0.0_dp) &
+         .and. all(table <= huge(1.0_dp))
+   end function describes_bound
 
    !> The bounds of a row.
    pure subroutine forces(self, n, force)

@@ -4,8 +4,8 @@
 !> ends only, and a cell need not slip during the whole step. Let e be the direction of r, t and t' the components of d
 !> along e at both ends, and b the value that t would have on the bound of the start. As long as the cell sticks, its
 !> traction is assumed to grow linearly, so that it would reach t' + |r|/a at the end of the step, while the bound
-!> changes linearly from b to t'. (a is the displacement of the contact under a unit traction: that of a cell times the
-!> root of the number of cells.) The slip begins where they meet, after the part s of the step:
+!> changes linearly from b to t'. (a is the displacement of the contact under a unit traction, `contact_compliance`.) The
+!> slip begins where they meet, after the part s of the step:
 !>
 !>    s = (b - t)/(b - t + |r|/a),   onset = b + s (t' - b),   loss = (onset + t')/2 |r|
 !>
@@ -19,7 +19,7 @@
 module friction_books
    use asperity_precision, only : dp
    use contact_rule, only : touches
-   use field_sums, only : field_count, row_totals
+   use field_sums, only : row_totals
    use friction_fields, only : friction_fields_type
    use friction_law, only : contact_open, contact_slip, contact_stick, friction_law_type, unbounded
    use tangential_state, only : tangential_state_type
@@ -38,10 +38,9 @@ module friction_books
 contains
 
    !> Form the sums of a step. The state keeps the frictional tractions and the forces of the law for the next step.
-   subroutine book_friction(state, law, compliance, fields, trial, rubbed)
+   subroutine book_friction(state, law, fields, trial, rubbed)
       type(tangential_state_type), intent(inout) :: state   !! displacement: at the start of the step
       type(friction_law_type), intent(in) :: law
-      real(dp), intent(in) :: compliance              !! of a cell, m/Pa; 0 if there is only one
       type(friction_fields_type), intent(in) :: fields   !! pressure, shares, slopes and slip of the step
       real(dp), intent(in) :: trial(:, :, :)          !! [nx, 2, rows] displacement at the end, m
       type(rubbed_type), intent(out) :: rubbed
@@ -52,7 +51,7 @@ contains
       allocate (rows(4, size(trial, 3)), source=0.0_dp)
       slope = 0.0_dp
       share = 1.0_dp
-      a = compliance*sqrt(field_count(state%contact /= contact_open))
+      a = contact_compliance(state, law, fields, trial)
       !$omp parallel do default(none) shared(state, law, a, fields, trial, rows) &
       !$omp private(i, j, before, force, rubbing, slip) firstprivate(share, slope)
       do j = 1, size(trial, 3)
@@ -80,6 +79,37 @@ contains
       total = row_totals(rows)
       rubbed = rubbed_type(total(1), total(2:3), total(4))
    end subroutine book_friction
+
+   !> The displacement of the contact under a unit traction in this step, m/Pa: the mean over the cells that stay in contact,
+   !> weighted with the square of the change d' - d of their frictional traction. It does not depend on how many periods of
+   !> a road are computed.
+   function contact_compliance(state, law, fields, trial) result(a)
+      type(tangential_state_type), intent(in) :: state      !! displacement and frictional traction at the start of the step
+      type(friction_law_type), intent(in) :: law
+      type(friction_fields_type), intent(in) :: fields
+      real(dp), intent(in) :: trial(:, :, :)          !! [nx, 2, rows] displacement at the end, m
+      real(dp) :: a
+      real(dp), allocatable :: rows(:, :)
+      real(dp) :: change(2), slope(2), total(2)
+      integer :: i, j
+
+      allocate (rows(2, size(trial, 3)), source=0.0_dp)
+      slope = 0.0_dp
+      !$omp parallel do default(none) shared(state, law, fields, trial, rows) private(i, j, change) firstprivate(slope)
+      do j = 1, size(trial, 3)
+         do i = 1, size(trial, 1)
+            if (state%contact(i, j) == contact_open .or. .not. state%force(i, j) > 0.0_dp) cycle
+            if (law%slope_effect) slope = [fields%slope_x(i, j), fields%slope_y(i, j)]
+            change = state%traction(i, :, j) - law%normal_traction(fields%pressure(i, j), slope) - state%rubbing(i, :, j)
+            rows(1, j) = rows(1, j) + dot_product(change, trial(i, :, j) - state%displacement(i, :, j))
+            rows(2, j) = rows(2, j) + dot_product(change, change)
+         end do
+      end do
+
+      total = row_totals(rows)
+      a = 0.0_dp
+      if (total(2) > 0.0_dp) a = max(total(1)/total(2), 0.0_dp)
+   end function contact_compliance
 
    !> Mark cells as sticking that are on their bound, but whose slip is not larger than the error of the solver may be.
    !> Which of the two states the solver assigns to such a cell is round-off: for example when the road has stopped.

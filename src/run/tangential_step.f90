@@ -396,7 +396,7 @@ contains
       fields%slope_x => slope_x
       fields%slope_y => slope_y
       fields%slip => self%slip
-      call book_friction(state, self%law, self%cell_compliance(), fields, self%trial, rubbed)
+      call book_friction(state, self%law, fields, self%trial, rubbed)
       state%lost_friction = state%lost_friction + rubbed%loss*self%grid%cell_area()
       if (self%dt > 0.0_dp .and. rubbed%cells > 0.0_dp) state%rate = rubbed%motion/(rubbed%cells*self%dt)
       call copy_field(self%trial, state%displacement)

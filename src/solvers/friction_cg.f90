@@ -285,7 +285,7 @@ contains
       if (.not. allocated(self%method)) then
          text = reason_unmade
       else if (.not. law%legal) then
-         text = 'the friction law is unknown, or one of its constants is missing or negative'
+         text = 'the friction law is unknown, or one of its constants is missing or outside its range'
       else if (.not. fields%fit_grid(operator%grid, law%slope_effect)) then
          text = reason_shape
       end if

@@ -25,6 +25,7 @@
 !> Each pass over the fields is one loop over rows, fused with the transforms of its row. Sums are
 !> formed by row and added up in order, so that the results do not depend on the number of threads or processes.
 module friction_problem
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_nan
    use asperity_precision, only : dp, int8
    use contact_runs, only : find_runs
    use fft_conv, only : columns_apply, convolution_type
@@ -480,6 +481,8 @@ contains
          self%least_scale, norm2(self%spring%offset))
       if (.not. self%scale > 0.0_dp) self%scale = 1.0_dp
       self%residual = sqrt(self%sums%largest)/self%scale
+      ! A maximum passes over values that are not numbers, but a sum does not.
+      if (ieee_is_nan(self%sums%drive + self%sums%displaced)) self%residual = self%sums%drive + self%sums%displaced
    end subroutine finish_measure
 
    !> Does the residual meet a tolerance, and with `settle` also the change of T?
