@@ -490,6 +490,9 @@ def test_a_job_array_fills_the_folder(tmp_path, monkeypatch):
     assert "at a time" not in summary
     assert re.search(r"^time +about \d+ s of one processor in all$", summary, re.MULTILINE)
     assert re.search(r"^memory +about \d+ MB for each run$", summary, re.MULTILINE)
+    limited = plan.summary(2, here=False)
+    assert ", 2 at a time" in limited
+    assert re.search(r"^memory +about \d+ MB for each run$", limited, re.MULTILINE)
     slurm = Means(None, slurm="--time=1:00:00 --partition='short jobs'")
     with pytest.raises(SubmittedError, match="2 runs submitted to Slurm as job 4711"):
         run_curve(plan, tmp_path / "runs", slurm, quiet=True)

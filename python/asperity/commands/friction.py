@@ -208,7 +208,7 @@ def _friction(chosen: argparse.Namespace) -> int:
                       angle=chosen.angle, tolerance=chosen.tolerance)
     plan = first_plan(plan, chosen.error, chosen.extend)
     means = means_of(chosen.jobs, 1, not chosen.no_resume, None, chosen.slurm)
-    print(plan.summary(means.side_by_side), flush=True)
+    print(plan.summary(means.side_by_side, here=means.slurm is None), flush=True)
     most = min(MOST_PATCHES, plan.road.count or MOST_PATCHES)
     if chosen.error is not None and plan.patches < most:
         print(f"more       up to {most} patches, until half of the 95 % interval of the friction is"

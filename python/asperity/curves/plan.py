@@ -185,13 +185,15 @@ class CurvePlan:
         units = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
         return float(found[1]) * units[found[2]] if found else math.nan
 
-    def summary(self, side_by_side: int | None = 1) -> str:
+    def summary(self, side_by_side: int | None = 1, here: bool = True) -> str:
         """Return a summary of the plan, one line per subject.
 
         Parameters
         ----------
         side_by_side : int or None
             Number of runs at a time; None where it is not known.
+        here : bool
+            Whether the runs share the memory of this machine.
 
         Returns
         -------
@@ -214,7 +216,7 @@ class CurvePlan:
             f"solves     {counted(self.solves, 'steady state')} in"
             f" {counted(self.solves // self.speed.size, 'run')}"
             + ("" if side_by_side is None else f", {side_by_side} at a time"),
-            *self._costs(side_by_side),
+            *self._costs(side_by_side, here),
         ]
         maps = [f"{name}: {nx} x {ny} cells, {lx:.4g} x {ly:.4g} m"
                 for name, nx, ny, lx, ly in road.maps]
@@ -222,15 +224,18 @@ class CurvePlan:
             ["maps", *[""] * len(maps)], maps, strict=False)]
         return "\n".join([*lines, *(f"note       {note}" for note in self.all_notes)])
 
-    def _costs(self, side_by_side: int | None) -> list[str]:
+    def _costs(self, side_by_side: int | None, here: bool) -> list[str]:
         """Return the lines of the summary about time and memory."""
         if side_by_side is None:
-            alone = duration(max(self.seconds(), 1.0))
-            return [f"time       about {alone} of one processor in all",
-                    f"memory     about {self.memory() / 1e6:.0f} MB for each run"]
-        return [f"time       about {duration(_COMMAND + self.seconds() / side_by_side)}, if the"
-                " processors have nothing else to do",
-                f"memory     about {(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB"]
+            time_ = f"{duration(max(self.seconds(), 1.0))} of one processor in all"
+        else:
+            time_ = (f"{duration(_COMMAND + self.seconds() / side_by_side)}, if the"
+                     " processors have nothing else to do")
+        if here and side_by_side is not None:
+            memory = f"{(_COMMAND_MEMORY + self.memory() * side_by_side) / 1e6:.0f} MB"
+        else:
+            memory = f"{self.memory() / 1e6:.0f} MB for each run"
+        return [f"time       about {time_}", f"memory     about {memory}"]
 
 
 def plan_curve(

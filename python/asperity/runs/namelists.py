@@ -244,6 +244,8 @@ def format_value(value: object) -> str:
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, str | Path):
+        if {"\n", "\r"} & set(str(value)):
+            raise ValueError(f"{shown(value)}: must be a text without line breaks")
         return "'" + str(value).replace("'", "''") + "'"
     if isinstance(value, bool):
         return ".true." if value else ".false."
