@@ -387,3 +387,19 @@ def test_the_loss_does_not_depend_on_how_many_periods_are_computed(law):
         loss.append(rows[-1].dissipated_friction / copies**2)
     assert loss[0] > 0
     assert loss[1] == pytest.approx(loss[0], rel=1e-6)
+
+
+def test_a_pull_grows_from_zero_if_the_road_has_not_moved():
+    """On a coarse mesh the pressures on the slopes have a sum, but nothing holds the road yet."""
+    case = asperity.Case(
+        grid={"nx": 12, "ny": 14, "lx": 1e-3},
+        surface={"shape": "self_affine", "hurst": 0.8, "rms_slope": 0.3, "seed": 3,
+                 "wavelength_long": 0.5e-3, "wavelength_short": 0.2e-3},
+        material={"shear_modulus": 1e6, "thickness": 1e-3},
+        friction={"law": "coulomb", "coefficient": 0.5},
+        phase=[{"pressure": 1e5}, {"traction_x": 2e3, "traction_y": -1e3, "ramp": "linear",
+                                   "duration": 1e-2, "steps": 4}],
+        solver={"tolerance": 1e-8})
+    rows = list(asperity.Simulation(case))[1:]
+    assert [row.traction_x for row in rows] == pytest.approx([500, 1000, 1500, 2000], rel=1e-6)
+    assert [row.traction_y for row in rows] == pytest.approx([-250, -500, -750, -1000], rel=1e-6)

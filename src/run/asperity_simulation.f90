@@ -229,12 +229,23 @@ contains
       self%material%dt_old = self%state%dt_old
       associate (state => self%state, row => self%state%row)
          call next_row(state%schedule, self%case%phases, [row%pressure, row%force, row%displacement], &
-            state%drive_force/self%grid%area(), plan, self%finished)
+            present_pull(self), plan, self%finished)
          if (self%finished) return
          call split_start(plan, needs_start(self%material) .or. plan%new_speed .or. plan%new_rate, &
             extrapolates(self%material), [row%road_x, row%road_y], parts)
       end associate
    end subroutine plan_row
+
+   !> The horizontal force from which a pull that grows starts, Pa. On true slopes it is the sum of T, which is 0 before the
+   !> road has moved; the sum of -P grad H over a contact at rest would only be an error of the mesh.
+   pure function present_pull(self) result(pull)
+      type(simulation_type), intent(in) :: self
+      real(dp) :: pull(2)
+
+      pull = 0.0_dp
+      if (self%case%friction%slope_effect .and. self%holds()) return
+      pull = self%state%drive_force/self%grid%area()
+   end function present_pull
 
    !> Take one step of a row, and fill the row of the history.
    subroutine take_step(self, plan, error)

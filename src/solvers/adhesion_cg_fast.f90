@@ -25,7 +25,8 @@
 !>
 !> If the attraction is strong, the energy has several minima, and the solver finds the one near the start. The start is
 !> therefore part of the problem. Under a negative prescribed pressure there may be no minimum: if all gaps are so wide
-!> that the attraction, which decreases with the gap, balances the pull nowhere, the reason is 'detached'.
+!> that the attraction, which decreases with the gap, balances the pull nowhere, the minimum is sought again with short
+!> steps; if the gaps become so wide again, the reason is 'detached'.
 !>
 !> Memory, in fields of doubles: H, g, P, the spectrum of B, and the work fields exchange, residual, direction, old
 !> residual, change, image, the step before and its product, curvature, state and traction of the model. In free mode
@@ -43,8 +44,8 @@ module adhesion_cg_fast
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : reason_closed, reason_converged, reason_detached, reason_limit, reason_stalled, &
-      resolved_traction
+   use adhesion_state, only : control_pressure, reason_closed, reason_converged, reason_detached, reason_limit, &
+      reason_stalled, resolved_traction
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_window, only : new_adhesion_window
    use adhesion_work, only : adhesion_iteration_type, adhesion_work_type, fresh, updated
@@ -65,6 +66,7 @@ module adhesion_cg_fast
    integer, parameter :: most_closings = 5     !! times that narrow gaps are closed before the end of a solve
    integer, parameter :: most_failures = 8      !! successive directions without a step
    integer, parameter :: most_calm = 8          !! largest number of good steps before longer ones are tried again
+   integer, parameter :: careful = 4            !! least caution of the second descent, if the first has left the contact
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
    real(dp), parameter :: negligible = 0.01_dp  !! round-off of a traction, over the tolerance of the residual
    real(dp), parameter :: still = 0.01_dp       !! relative change of a residual that hardly changes
@@ -118,13 +120,71 @@ contains
       type(adhesion_contact_type), intent(inout) :: contact
       type(solver_result_type), intent(out) :: outcome
       type(adhesion_iteration_type) :: now
-      real(dp) :: transforms_before
+      real(dp), allocatable :: start(:, :)
+      real(dp) :: level_before, transforms_before
 
       if (self%work%patch%is_full_contact(contact%problem, contact%height)) then
          outcome%reason = reason_closed
          return
       end if
       transforms_before = transforms(self)
+      call keep_start(self, contact, start)
+      level_before = contact%level
+      call begin_iteration(self, contact, now)
+      call minimise(self, now, outcome)
+      if (outcome%reason == reason_detached) then
+         ! A long step may have leapt over the barrier behind the minimum.
+         call restore_start(self, contact, start)
+         contact%level = level_before
+         call begin_iteration(self, contact, now)
+         now%least_caution = careful
+         now%caution = careful
+         call minimise(self, now, outcome)
+      end if
+      if (outcome%stopped) return
+
+      call self%work%patch%return_solution(now, outcome%load_error)
+      contact%level = now%level
+      ! A transform of the model counts as a fraction. The small addition keeps the round-off of earlier counts from
+      ! deciding how a half is rounded.
+      outcome%ffts = nint(transforms(self) - transforms_before + 1e-6_dp, int64)
+   end subroutine solve
+
+   !> Keep the field from which a solve starts, because its place will hold the solution. Only a pull by a prescribed force
+   !> may separate the surfaces and need it again.
+   subroutine keep_start(self, contact, start)
+      type(adhesion_fast_type), intent(in) :: self
+      type(adhesion_contact_type), intent(in) :: contact
+      real(dp), allocatable, intent(out) :: start(:, :)
+
+      if (contact%problem%control /= control_pressure .or. contact%problem%target >= 0.0_dp) then
+         allocate (start(0, 0))
+      else if (self%work%patch%periodic) then
+         allocate (start, source=contact%gap)
+      else
+         allocate (start, source=contact%pressure)
+      end if
+   end subroutine keep_start
+
+   !> Put the field back from which a solve starts.
+   subroutine restore_start(self, contact, start)
+      type(adhesion_fast_type), intent(in) :: self
+      type(adhesion_contact_type), intent(inout) :: contact
+      real(dp), intent(in) :: start(:, :)
+
+      if (self%work%patch%periodic) then
+         contact%gap(:, :) = start
+      else
+         contact%pressure(:, :) = start
+      end if
+   end subroutine restore_start
+
+   !> Begin the iteration at the start of the contact.
+   subroutine begin_iteration(self, contact, now)
+      type(adhesion_fast_type), intent(inout), target :: self
+      type(adhesion_contact_type), intent(in) :: contact
+      type(adhesion_iteration_type), intent(out) :: now
+
       now%adhesion_contact_type = contact
       if (self%work%patch%periodic) then
          now%state => contact%gap
@@ -134,15 +194,7 @@ contains
          now%traction => self%traction
       end if
       call begin_contact(self%work%patch, now)
-      call minimise(self, now, outcome)
-      if (outcome%stopped) return
-
-      call self%work%patch%return_solution(now, outcome%load_error)
-      contact%level = now%level
-      ! A transform of the model counts as a fraction. The small addition keeps the round-off of earlier counts from
-      ! deciding how a half is rounded.
-      outcome%ffts = nint(transforms(self) - transforms_before + 1e-6_dp, int64)
-   end subroutine solve
+   end subroutine begin_iteration
 
    !> Minimise the energy, starting from the present state of the contact.
    subroutine minimise(self, now, outcome)
@@ -378,7 +430,7 @@ contains
    subroutine gain_confidence(now)
       type(adhesion_iteration_type), intent(inout) :: now
 
-      if (now%caution == 0) then
+      if (now%caution == now%least_caution) then
          now%setbacks = 0
          return
       end if

@@ -46,6 +46,7 @@ module adhesion_work
       integer :: closings = 0                    !! times that narrow gaps were closed
       integer :: failures = 0                    !! successive steps that did not lower the energy
       integer :: caution = 0                     !! number of quarterings of the lengths allowed, after failures
+      integer :: least_caution = 0               !! that is kept after good steps, too
       integer :: setbacks = 0                    !! steps that failed or were short, since a step without caution was good
       integer :: calm = 0                        !! successive good steps with the present caution
       real(dp) :: residual = 0.0_dp              !! natural residual of the present traction
