@@ -471,6 +471,29 @@ def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program, capsy
     assert table.failed == [] and table.runs[0].finished
 
 
+@pytest.mark.parametrize("by_executor", [False, True])
+def test_cases_that_another_sweep_completes_are_not_run_again(tmp_path, monkeypatch, by_executor):
+    """While the first of three cases is counted, another sweep completes all of them."""
+    parameters = {"phase[1].pressure": [1e3, 2e3, 3e3]}
+    done = asperity.runs.progress.Progress.done
+    made = {}
+
+    def count(self, *arguments):
+        if not made:
+            made["begun"] = 0
+            for path in sweep(sliding(), parameters, folder=tmp_path).paths:
+                made[path] = (path.stat().st_ino, path.stat().st_mtime_ns)
+        done(self, *arguments)
+
+    monkeypatch.setattr(asperity.runs.progress.Progress, "done", count)
+    with ThreadPoolExecutor(1) as executor:
+        table = sweep(sliding(), parameters, folder=tmp_path, jobs=1,
+                      executor=executor if by_executor else None)
+    assert table.failed == [] and all(run.finished for run in table.runs)
+    for path in table.paths:
+        assert (path.stat().st_ino, path.stat().st_mtime_ns) == made[path], path.name
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux")
 def test_a_restart_that_cannot_write_keeps_the_checkpoint(tmp_path, program):
     """Only a checkpoint that cannot be used leads to a run from the beginning."""

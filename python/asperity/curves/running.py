@@ -14,7 +14,7 @@ from pathlib import Path
 from ..base.files import make_folder
 from ..results import Run, open_result
 from ..roads.patches import Patch
-from ..runs.jobs import Job, found_result, is_done
+from ..runs.jobs import Job, take_end
 from ..runs.means import Means, run_jobs
 from ..runs.progress import Progress
 from .plan import CurvePlan
@@ -101,7 +101,7 @@ def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False,
     begun, fresh = list(pieces), pieces
     while fresh:
         waiting = [piece.job for piece in fresh
-                   if not ((means.resume or piece.job.name in renewed) and _is_there(piece.job))]
+                   if not ((means.resume or piece.job.name in renewed) and take_end(piece.job))]
         renewed |= {piece.job.name for piece in fresh}
         progress = Progress("friction", len(fresh), len(waiting), quiet)
         run_jobs(waiting, folder, progress, means)
@@ -131,21 +131,6 @@ def _piece(plan: CurvePlan, patch: Patch, file: str, folder: Path,
         name += f"-from{first}"
     values = {"patch": n, "pressure": plan.pressure[i], "temperature": plan.temperature[j]}
     return Piece(n, i, j, first, Job(values, case, name, folder / f"{name}.h5"))
-
-
-def _is_there(job: Job) -> bool:
-    """Return whether there is a result of the same input that need not be run again.
-
-    It is complete, or it has ended because a solver did not converge. The status of the job is set.
-    """
-    if is_done(job):
-        job.status = 0
-        return True
-    run = found_result(job)
-    if run is not None and not run.finished and "converge" in run.outcome:
-        job.status = 4
-        return True
-    return False
 
 
 def _look_for_failures(pieces: list[Piece]) -> None:

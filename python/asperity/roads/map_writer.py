@@ -54,7 +54,7 @@ def new_map_file(path: Path, title: str, program: str, size: int) -> Iterator[h5
     import h5py
 
     check_output(path, MAP)
-    new = path.with_name(path.name + ".new")
+    new = path.with_name(f"{path.name}.{os.getpid()}.new")
     try:
         with new.open("wb") as empty:
             if hasattr(os, "posix_fallocate"):

@@ -57,7 +57,7 @@ class Patch:
         return found.hexdigest()[:12]
 
     def save(self, folder: Path) -> Path:
-        """Write the map to a folder, unless it is already there.
+        """Write the map to a folder, unless it is already there. A damaged file is replaced.
 
         Parameters
         ----------
@@ -70,12 +70,24 @@ class Patch:
             The file.
         """
         path = folder / f"patch-{self.code}.h5"
+        if path.exists() and not self._is_in(path):
+            path.unlink()
         if not path.exists():
             surface = MeasuredSurface(
                 self.height, self.lx, self.ly, True, "m",
                 source={"name": self.label, "format": "patch", "metadata": {}})
             surface.save(path)
         return path
+
+    def _is_in(self, path: Path) -> bool:
+        """Return whether a file holds the heights."""
+        import h5py
+
+        try:
+            with h5py.File(path, "r", locking=False) as file:
+                return np.array_equal(file["surface/height"], self.height)
+        except (OSError, KeyError):
+            return False
 
 
 def low_pass(height: FloatArray, lx: float, ly: float, short: float) -> FloatArray:

@@ -24,8 +24,8 @@ from . import namelists
 from .case import Case
 from .progress import Progress
 
-__all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result", "is_done",
-           "run_here", "text_of", "write_input"]
+__all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "end_of", "environment", "found_result",
+           "is_done", "run_here", "take_end", "text_of", "write_input"]
 
 _map_checksum = call("map_checksum")
 
@@ -59,6 +59,26 @@ def is_done(job: Job) -> bool:
     """Return whether there is a complete result of the same input and version."""
     run = found_result(job)
     return run is not None and run.finished and run.version == version()
+
+
+def end_of(job: Job) -> int | None:
+    """Return the exit status with which a run of the same input has ended for good, or None.
+
+    It is 0 where the result is complete, and 4 where a solver did not converge.
+    """
+    if is_done(job):
+        return 0
+    run = found_result(job)
+    return 4 if run is not None and not run.finished and "converge" in run.outcome else None
+
+
+def take_end(job: Job) -> bool:
+    """Record the end of a run that another process has made; return whether there is one."""
+    status = end_of(job)
+    if status is None:
+        return False
+    job.status, job.message = status, open_result(job.path).outcome if status else ""
+    return True
 
 
 def found_result(job: Job) -> Run | None:
@@ -144,12 +164,17 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
     side_by_side, threads : int
         Number of processes at a time, and number of threads of each.
     resume : bool
-        Whether to continue from checkpoints.
+        Whether to continue from checkpoints, and to take results that another process completes
+        while these jobs are waiting.
     progress : Progress
         The display of the progress.
     """
     queue = list(waiting)
     running: list[Job] = []
+    old = {job.name for job in waiting if end_of(job) is not None}
+
+    def is_ended(job: Job) -> bool:
+        return resume and job.name not in old and take_end(job)
 
     def count(job: Job) -> None:
         progress.done(job.name, job.message if job.status else None,
@@ -161,8 +186,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
                 ready = [job for job in queue if job.due <= time.monotonic()]
                 for job in ready[:side_by_side - len(running)]:
                     queue.remove(job)
-                    if job.due and resume and is_done(job):  # by the process that used it
-                        job.status, job.message = 0, ""
+                    if is_ended(job):
                         count(job)
                     elif not stops.asked:
                         running.append(job)
@@ -172,7 +196,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
                     assert job.process is not None
                     if job.process.poll() is None:
                         continue
-                    if _finish(job):
+                    if _finish(job) and not is_ended(job):
                         _start(job, command, threads, restart=False)
                         continue
                     running.remove(job)
