@@ -8,13 +8,15 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["Rows", "cells_of", "decimals", "heads_of_comment", "is_comment", "is_missing",
-           "is_number", "text_lines", "text_of"]
+__all__ = ["Rows", "cells_of", "decimals", "doubtful_number", "heads_of_comment", "is_comment",
+           "is_missing", "is_number", "text_lines", "text_of"]
 
 Rows = list[tuple[int, list[str]]]
 
 _COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?(?:[eE][-+]?\d+)?")
+_PLAIN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
+_SMALL = re.compile(r"[-+]?\d{1,3}")
 _THOUSANDS_BY_POINT = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+(?:[eE][-+]?\d+)?")
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
@@ -165,7 +167,8 @@ def is_number(cell: str) -> bool:
 def decimals(rows: Rows) -> Rows:
     """Return the cells with decimal points, and without separators of thousands.
 
-    A comma is the decimal sign, unless other cells have decimal points: then it separates
+    A comma is the decimal sign, unless other cells have decimal points, or all commas of the table
+    stand before three digits and the same column has whole numbers below 1000: then it separates
     thousands.
 
     Examples
@@ -176,9 +179,12 @@ def decimals(rows: Rows) -> Rows:
     [(1, ['0.5', '943120'])]
     >>> decimals([(1, ["0,5", "1.943,5"])])
     [(1, ['0.5', '1943.5'])]
+    >>> decimals([(1, ["943,120"]), (2, ["87"])])
+    [(1, ['943120']), (2, ['87'])]
     """
-    points = any(_POINT.fullmatch(cell) or (_THOUSANDS.fullmatch(cell) and "." in cell)
-                 for _, cells in rows for cell in cells)
+    points = _has_thousands(rows) or any(
+        _POINT.fullmatch(cell) or (_THOUSANDS.fullmatch(cell) and "." in cell)
+        for _, cells in rows for cell in cells)
 
     def plain(cell: str) -> str:
         if "," not in cell:
@@ -192,3 +198,45 @@ def decimals(rows: Rows) -> Rows:
         return cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell
 
     return [(at, [plain(cell) for cell in cells]) for at, cells in rows]
+
+
+def _has_thousands(rows: Rows) -> bool:
+    """Return whether all commas separate thousands, because of whole numbers below 1000 there."""
+    if not any("," in cell for _, cells in rows for cell in cells):
+        return False
+    numbers = [(column, cell) for _, cells in rows for column, cell in enumerate(cells)
+               if is_number(cell)]
+    with_comma = [(column, cell) for column, cell in numbers if "," in cell]
+    columns = {column for column, _ in with_comma}
+    return (all(_PLAIN_THOUSANDS.fullmatch(cell) for _, cell in with_comma)
+            and any(_SMALL.fullmatch(cell) for column, cell in numbers if column in columns))
+
+
+def doubtful_number(lines: Sequence[tuple[int, str]]) -> str:
+    r"""Return a number of which the comma may be the decimal sign or separate thousands.
+
+    Parameters
+    ----------
+    lines : sequence of (int, str)
+        The lines of a table with their numbers.
+
+    Returns
+    -------
+    str
+        The number, or an empty string if there is no doubt. Doubtful are tables whose cells stand
+        in quotation marks between commas, if all commas in the cells stand before three digits and
+        no cell is a whole number below 1000.
+
+    Examples
+    --------
+    >>> doubtful_number([(1, '"12,975","19,845"')]), doubtful_number([(1, '"12,975","0,845"')])
+    ('12,975', '')
+    """
+    if not any(re.search(r'"\s*,\s*"', line) for _, line in lines):
+        return ""
+    rows = cells_of(lines)
+    numbers = [cell for _, cells in rows for cell in cells if is_number(cell)]
+    with_comma = [cell for cell in numbers if "," in cell]
+    clear = (_has_thousands(rows) or any("." in cell for cell in numbers)
+             or not all(_PLAIN_THOUSANDS.fullmatch(cell) for cell in with_comma))
+    return "" if clear or not with_comma else with_comma[0]

@@ -21,6 +21,7 @@ from ..base.tables import (
     Rows,
     cells_of,
     decimals,
+    doubtful_number,
     heads_of_comment,
     is_missing,
     is_number,
@@ -198,8 +199,11 @@ def text_map(path: Path, kind: str = "text") -> PlainReader:
         return PlainReader(kind, PlainMap(table.T.copy(), "Default"))
     if columns == 1:
         return PlainReader(kind, PlainMap(table[:, 0], "Default"))
-    units = (_units(head or heads_of_comment(path, columns))
-             or _units_of_comments(path, columns))
+    head = head or heads_of_comment(path, columns)
+    if len(head) == columns:
+        order = _order(head)
+        table, head = table[:, order], [head[i] for i in order]
+    units = _units(head) or _units_of_comments(path, columns)
     unit = None
     if len(units) == columns:
         table[:, :-1] *= [_METRES[one] / _METRES[units[-1]] for one in units[:-1]]
@@ -219,7 +223,13 @@ def text_table(path: Path) -> tuple[FloatArray, list[str]]:
         lines of different lengths. The message contains the line. A line above the table may be a
         heading, but not a line of numbers with a typing error.
     """
-    rows = decimals(cells_of(text_lines(path)))
+    lines = text_lines(path)
+    doubtful = doubtful_number(lines)
+    if doubtful:
+        raise ValueError(f"{path}: {doubtful} may be a decimal number or one with a comma between"
+                         " thousands: write the numbers with decimal points and without other"
+                         " commas")
+    rows = decimals(cells_of(lines))
     first = next((i for i, (_, cells) in enumerate(rows)
                   if any(map(is_number, cells)) and all(map(is_value, cells))), None)
     if first is None:
@@ -229,7 +239,24 @@ def text_table(path: Path) -> tuple[FloatArray, list[str]]:
         refuse_garbled(path, line, cells, len(body[0][1]))
     while all(len(cells) > 1 and cells[-1] == "" for _, cells in body):
         body = [(line, cells[:-1]) for line, cells in body]  # all lines end with a separator
-    return _numbers(path, body), rows[first - 1][1] if first else []
+    return _numbers(path, body), _heading(rows[:first])
+
+
+def _heading(above: Rows) -> list[str]:
+    """Return the heading of a table from the lines above it. It may have a second line of units.
+
+    Examples
+    --------
+    >>> _heading([(1, ["x", "z"]), (2, ["mm", "um"])])
+    ['x (mm)', 'z (um)']
+    """
+    if not above:
+        return []
+    last = above[-1][1]
+    units = [re.fullmatch(r"[\[(]?\s*([mnuµμ]?m)\s*[\])]?", cell) for cell in last]
+    if len(above) < 2 or len(above[-2][1]) != len(last) or not all(units):
+        return last
+    return [f"{name} ({unit[1]})" for name, unit in zip(above[-2][1], units, strict=True) if unit]
 
 
 def refuse_garbled(path: Path, line: int, cells: list[str], width: int) -> None:
@@ -276,15 +303,29 @@ def _units_of_comments(path: Path, columns: int) -> list[str]:
     return units[:1] * (columns - 1) + units[1:]
 
 
+def _order(head: list[str]) -> list[int]:
+    """Return the columns of x, y and z, if the heading names them; otherwise those of the file.
+
+    Examples
+    --------
+    >>> _order(["z (um)", "x (mm)", "y (mm)"]), _order(["a", "b", "c"])
+    ([1, 2, 0], [0, 1, 2])
+    """
+    names = [re.match(r"([xyz])(?![a-z])", cell.strip().lower()) for cell in head]
+    found = [name[1] if name else "" for name in names]
+    wanted = ["x", "y", "z"] if len(head) == 3 else ["x", "z"]
+    return [found.index(name) for name in wanted if sorted(found) == wanted] or [*range(len(head))]
+
+
 def _units(head: list[str]) -> list[str]:
-    """Return the units that a header names in parentheses, in brackets or behind a slash.
+    """Return the units that a header names in parentheses, in brackets or behind a slash or `_`.
 
     Examples
     --------
     >>> _units(["x (mm)", "y [mm]", "z / µm"]), _units(["x", "y", "z"])
     (['mm', 'mm', 'um'], [])
     """
-    found = [re.search(r"(?:[\[(]\s*|/\s*)([mnuµμ]?m)\s*[\])]?\s*$", cell) for cell in head]
+    found = [re.search(r"(?:[\[(]\s*|/\s*|_)([mnuµμ]?m)\s*[\])]?\s*$", cell) for cell in head]
     units = [re.sub("[µμ]", "u", one[1]) for one in found if one]
     return [unit for unit in units if unit in _METRES]
 
