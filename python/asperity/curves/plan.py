@@ -203,12 +203,15 @@ class CurvePlan:
         ny, nx = patch.height.shape
         band = road.whole_spectrum.band
         kept = f"{min(_longest(self), band[0]):.4g} to {road.short:.4g} m"
+        heights = statistics(patch.height, patch.lx, patch.ly)
         lines = [
             f"road       {road.name}: {counted(self.patches, 'patch', 'patches')} of"
             f" {nx} x {ny} cells, {patch.lx:.4g} x {patch.ly:.4g} m"
             + ("" if road.join == "none" else f", made periodic by {road.join!r}"),
             f"waves      {kept} are kept of {band[0]:.4g} to"
             f" {min(band[1], road.short):.4g} m",
+            f"heights    rms {heights.rms_height:.4g} m, rms slope {heights.rms_slope:.4g}"
+            f" ({patch.label})",
             f"rubber     {self.compound.name}: {counted(self.compound.series.g.size, 'arm')}",
             f"points     {counted(self.speed.size, 'speed')} x"
             f" {counted(self.pressure.size, 'pressure')} x"

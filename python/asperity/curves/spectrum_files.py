@@ -54,14 +54,14 @@ def spectrum_of_file(path: Path) -> Spectrum:
     values = _numbers(path, rows[1:] if heads else rows)
     heads = heads or heads_of_comment(path, len(rows[0][1]))
     first, second = heads[:2] if len(heads) > 1 else ("", "")
-    if re.search("wavelength|lambda|λ|freq", first, re.IGNORECASE):
+    if re.search(r"wavelength|lambda|λ|freq|^\W*f\b(?!.*rad)", first, re.IGNORECASE):
         raise ValueError(f"{path}: column 1 is {first!r}: must be the wave number, in rad/m")
     found = _unit(path, 1, first, _WAVE_UNIT, "rad/m, 1/m, rad/mm, 1/mm, rad/um or 1/um")
     values[:, 0] /= 1.0 if found is None else _METRES[found["length"] or found["other"]]
     found = _unit(path, 2, second, _PSD_UNIT, "m4, mm4 or um4, or m3, mm3 or um3 of a profile")
     power = 4 if found is None else int(found["power"])
     values[:, 1] *= 1.0 if found is None else _METRES[found["length"]] ** power
-    if re.match(r"\s*C(\b|_|1D|2D|iso)", second):
+    if re.match(r"\s*C[12]?(\b|_|D|iso)", second):
         values[:, 1] *= (2.0 * math.pi) ** (power - 2)
     wave, psd = values[np.argsort(values[:, 0])].T
     try:

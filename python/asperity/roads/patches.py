@@ -90,6 +90,13 @@ class Patch:
             return False
 
 
+def _are_equal(one: MeasuredSurface, other: MeasuredSurface) -> bool:
+    """Return whether two maps have the same heights, apart from the round-off of other units."""
+    if one.height.shape != other.height.shape:
+        return False
+    return np.allclose(one.height, other.height, rtol=0.0, atol=1e-6 * float(np.std(one.height)))
+
+
 def low_pass(height: FloatArray, lx: float, ly: float, short: float) -> FloatArray:
     """Return a periodic map without the waves below a length.
 
@@ -332,6 +339,9 @@ class MeasuredRoad:
                 raise ValueError(f"{one.source.get('name', 'map')}: is a profile: no patches can be"
                                  " cut from it; it serves as the spectrum of an isotropic road")
             clean, notes = cleaned(one, outliers)
+            if any(_are_equal(clean, other) for other in self._maps):
+                raise ValueError(f"{one.source.get('name', 'map')}: has the heights of another map:"
+                                 " its patches would count as independent ones")
             self._maps.append(clean)
             self.notes += notes
         fewest = min(min(one.height.shape) for one in maps)

@@ -204,16 +204,27 @@ def find_columns(
     if found["frequency"] == "1/s":  # means rad/s for an angular frequency, otherwise Hz
         found["frequency"] = "rad/s" if at < len(parts) and parts[at][0] in _ANGULAR else "Hz"
     found["angular"] = "yes" if at < len(parts) and parts[at][0] in _ANGULAR else None
-    kind = None
-    if places["storage"] < len(parts):
-        name = parts[places["storage"]][0]
-        head = heads[places["storage"]]
-        tensile = name.startswith("tensile") or re.match(r"e('|\d|p|storage)", name)
-        if tensile or re.search(r"\bE\s*['′’]", head):
-            kind = "tension"
-        elif name.startswith(("shear", "g")) or re.search(r"\bG\s*['′’]", head):
-            kind = "shear"
-    return places, found, kind
+    kinds = {role: _kind(heads[places[role]], parts[places[role]][0])
+             for role in ("storage", "loss") if places.get(role, len(parts)) < len(parts)}
+    if set(kinds.values()) == {"shear", "tension"}:
+        raise ValueError(f"{path}: line {header[0]}: {heads[places['storage']]!r} and"
+                         f" {heads[places['loss']]!r} are moduli of shear and of tension: both must"
+                         " be of the same kind")
+    return places, found, kinds.get("storage") or kinds.get("loss")
+
+
+def _kind(head: str, name: str) -> str | None:
+    """Return the kind of a modulus that the heading of its column names, if any.
+
+    Examples
+    --------
+    >>> _kind("G'' (MPa)", "g''"), _kind("E' (MPa)", "e'"), _kind("Loss modulus", "lossmodulus")
+    ('shear', 'tension', None)
+    """
+    tensile = name.startswith("tensile") or re.match(r"e('|\d|p|storage|loss)", name)
+    if tensile or re.search(r"\bE\s*['′’]", head):
+        return "tension"
+    return "shear" if name.startswith(("shear", "g")) or re.search(r"\bG\s*['′’]", head) else None
 
 
 def _like_temperatures(parts: list[tuple[str, str | None]], units: list[str]) -> list[int]:
