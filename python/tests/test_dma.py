@@ -808,6 +808,13 @@ def test_arguments_of_another_type_are_named(tmp_path):
         fit_dma(read_dma(path), wlf=3.0)
 
 
+def test_moduli_of_two_kinds_are_refused(tmp_path):
+    path = tmp_path / "mixed.csv"
+    path.write_text("f (Hz),E' (MPa),G'' (MPa)\n1,2.4,0.03\n10,2.5,0.05\n")
+    with pytest.raises(ValueError, match="\"E' \\(MPa\\)\" and \"G'' \\(MPa\\)\" are moduli of"):
+        read_dma(path)
+
+
 @pytest.mark.parametrize(("heads", "kind", "noted"), [
     ("G',G''", None, False), ("E',E''", None, False), ("storage,loss", None, True),
     ("Storage modulus,Loss modulus", "shear", False), ("storage,loss", "tension", False),

@@ -401,6 +401,16 @@ def test_more_patches_do_not_repeat_runs_without_resume(tmp_path, capsys):
     assert first == ("0", "8") and later[0][0] == "8"
 
 
+def test_a_damaged_patch_is_written_anew(tmp_path):
+    plan = small_plan(speeds=[1e-2])
+    friction = curve_of(plan, tmp_path).mean("friction")
+    for damaged in tmp_path.glob("patch-*.h5"):
+        damaged.write_bytes(damaged.read_bytes()[:2000])
+    for result in tmp_path.glob("*-p*.h5"):
+        result.unlink()
+    np.testing.assert_array_equal(curve_of(plan, tmp_path).mean("friction"), friction)
+
+
 def test_ctrl_c_ends_without_a_traceback(tmp_path):
     (tmp_path / "rubber.nml").write_text(NAMELIST)
     # A shell starts programs in the background with SIGINT ignored.
@@ -1153,7 +1163,7 @@ def test_ranges_have_equal_ratios_but_those_of_temperatures_equal_steps(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "r.nml").write_text(NAMELIST)
     found = []
-    monkeypatch.setattr(CurvePlan, "summary", lambda plan, _: found.append(plan) or "")
+    monkeypatch.setattr(CurvePlan, "summary", lambda plan, *_, **__: found.append(plan) or "")
     assert main(["friction", ROAD, "--material", "r.nml", "--cells", "32", "--plan",
                  f"--{option}", given]) == 0
     assert getattr(found[0], option.removesuffix("s")).tolist() == expected
@@ -1227,16 +1237,18 @@ def test_persson_density_of_a_profile(tmp_path):
     """C1D = Phi1/(2 pi) in the convention in which C = Phi/(4 pi^2)."""
     k = np.geomspace(1e3, 1e5, 9)
     found = []
-    for head, factor in (("Phi1 (m3)", 1.0), ("C1D (m3)", 2.0 * np.pi), ("C(q) m^3", 2.0 * np.pi)):
+    for head, factor in (("Phi1 (m3)", 1.0), ("C1D (m3)", 2.0 * np.pi), ("C(q) m^3", 2.0 * np.pi),
+                         ("C1 (m3)", 2.0 * np.pi)):
         table = np.column_stack([k, 1e-13 * (k / 1e4) ** -2.6 / factor])
         np.savetxt(tmp_path / "s.csv", table, header=f"q (rad/m), {head}", comments="",
                    delimiter=",")
         found.append(road_of([f"spectrum:{tmp_path / 's.csv'}"], cells=64).whole_spectrum.psd)
-    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-9)
+    np.testing.assert_allclose(found[1:], [found[0]] * 3, rtol=1e-9)
 
 
 @pytest.mark.parametrize(("head", "message"), [
     ("wavelength (m), Phi (m4)", "must be the wave number"),
+    ("f (1/m), Phi (m4)", "column 1 is 'f (1/m)': must be the wave number, in rad/m"),
     ("q (cycles/m), Phi (m4)", "has the unit 'cycles/m'"),
     ("q (rad/m), PSD (dB)", "has the unit 'dB'")])
 def test_spectra_that_are_refused(tmp_path, head, message):
@@ -1248,14 +1260,16 @@ def test_spectra_that_are_refused(tmp_path, head, message):
 def test_options_count_for_all_roads_and_no_road_counts_twice(tmp_path):
     height = asperity.surface.self_affine(96, lx=1e-3, wavelength_long=2e-4, wavelength_short=8e-5,
                                           rms_slope=0.1, seed=3) + np.linspace(0.0, 1e-5, 96)
-    for name in ("a.h5", "b.h5"):
-        asperity.surface.save(tmp_path / name, height, 1e-3, boundary="free")
+    for name, sign in (("a.h5", 1.0), ("b.h5", -1.0), ("c.h5", 1.0)):
+        asperity.surface.save(tmp_path / name, sign * height, 1e-3, boundary="free")
     files = [tmp_path / "a.h5", tmp_path / "b.h5"]
     road = road_of(files, cells=32, level="none", join="mirror")
     first, second = (one.height for one in road._maps)
-    np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(first, -second)
     with pytest.raises(ValueError, match=r"a\.h5 is given twice"):
         road_of([files[0], str(files[0])], cells=32)
+    with pytest.raises(ValueError, match=r"^c\.h5: has the heights of another map"):
+        road_of([*files, tmp_path / "c.h5"], cells=32)
     with pytest.raises(ValueError, match="roads: a ndarray"):
         road_of([height], cells=32)
 
@@ -1283,10 +1297,13 @@ def test_each_road_may_have_its_own_unit_and_size(tmp_path, monkeypatch, capsys)
                                           rms_slope=0.1, seed=3)
     np.savetxt("a.txt", 1e6 * height)
     np.savetxt("b.txt", 1e3 * height[:64])
-    asperity.surface.save("c.h5", height, 1e-3, boundary="free")
+    asperity.surface.save("c.h5", -height, 1e-3, boundary="free")
     own = ["a.txt:unit=um,size=1000x1000", "b.txt:unit=mm,size=1x0.6666666667", "c.h5"]
     first, second, third = road_of(own, cells=32)._maps
-    np.testing.assert_allclose(first.height, third.height, rtol=1e-9, atol=1e-18)
+    np.testing.assert_allclose(first.height, -third.height, rtol=1e-9, atol=1e-18)
+    np.savetxt("d.txt", 1e3 * height)
+    with pytest.raises(ValueError, match=r"^d\.txt: has the heights of another map"):
+        road_of([own[0], "d.txt:unit=mm,size=1x1"], cells=32)
     assert (first.lx, first.ly) == (1e-3, 1e-3)
     assert second.lx == 1e-3 and second.height.std() == pytest.approx(
         first.height[:64].std(), rel=0.2)

@@ -162,6 +162,38 @@ def test_a_map_of_comments_only(tmp_path, text, ending):
         load(path, unit="um", size=(LX, LY))
 
 
+@pytest.mark.parametrize("heads", ["Y (mm),X (mm),Z (um)", "z_um,x_mm,y_mm", "Y,X,Z\nmm,mm,um"])
+def test_headings_name_the_columns_of_points(tmp_path, heads):
+    """Five cells along x and four along y, in whatever order the columns stand."""
+    height = np.random.default_rng(1).integers(-50, 50, (4, 5)).astype(float)
+    y, x = np.mgrid[0:4, 0:5]
+    values = {"x": 0.5 * x.ravel(), "y": 0.25 * y.ravel(), "z": height.ravel()}
+    order = [head.strip()[0].lower() for head in heads.split("\n")[0].split(",")]
+    np.savetxt(tmp_path / "p.csv", np.column_stack([values[name] for name in order]), fmt="%.9g",
+               header=heads, comments="", delimiter=",")
+    found = load(tmp_path / "p.csv", level="none")
+    assert (found.lx, found.ly) == pytest.approx((2.5e-3, 1e-3))
+    np.testing.assert_allclose(found.height, 1e-6 * height)
+
+
+def test_commas_between_thousands(tmp_path):
+    """Whole numbers below 1000 without a comma show that commas do not mean decimals."""
+    height = np.array([[12975.0, 604.0, 1030.0, 87.0], [-487.0, 2295.0, -20231.0, 5.0]])
+
+    def table(numbers, mark):
+        return "\n".join(mark.join(f'"{number:,.0f}"' for number in row) for row in numbers) + "\n"
+
+    (tmp_path / "a.csv").write_text(table(height, ","))
+    found = load(tmp_path / "a.csv", unit="nm", size=(4e4, 2e4), level="none")
+    np.testing.assert_allclose(found.height, 1e-9 * height)
+    (tmp_path / "b.csv").write_text(table(height + 1e5, ","))
+    with pytest.raises(ValueError, match=r"112,975 may be a decimal number or one with a comma"):
+        load(tmp_path / "b.csv", unit="nm", size=(4e4, 2e4))
+    (tmp_path / "c.csv").write_text(table(height + 1e5, ";"))
+    found = load(tmp_path / "c.csv", unit="um", size=(40, 20), level="none")
+    np.testing.assert_allclose(found.height, 1e-9 * (height + 1e5))
+
+
 def test_points_on_a_grid_with_holes(tmp_path):
     """A list of points leaves out those that were not measured; their places are filled."""
     y, x = np.mgrid[0:NY, 0:NX]
