@@ -412,3 +412,34 @@ def test_a_gauss_potential_lets_cells_open_at_a_given_displacement():
         found = asperity.solve_adhesive(height, float(n), None, 1.0, displacement=0.4 * full,
                                         start=near, **given)
         assert found.residual <= 1e-6
+
+
+def test_a_long_step_does_not_separate_surfaces_that_still_hold():
+    """There is an equilibrium near the row before, which 28 and more steps find as well."""
+    height = 4.4746e-3 * np.array([
+        0.5939, -0.0786, 0.0585, 0.1269, 0.9387, 0.7356, 0.0382, 0.0334, 0.1252, 0.455, 0.715,
+        0.8875, 0.7115, 0.0348, 0.2045, 0.9724, -0.0846, -1.0, -0.7754, -0.9213, -0.4136, 0.2577,
+        0.3505, 0.1705, 0.5033, 0.7691, 0.5519, 0.7592, 0.0245, 0.2422])
+    gaps = []
+    for steps in (14, 28):
+        case = asperity.Case(
+            grid={"nx": 30, "ny": 1, "lx": 1.67346, "ly": 0.0275037},
+            surface=[height[None, :]], material={"poisson": -0.4, "shear_modulus": 3.21625e6},
+            adhesion={"potential": "maugis_dugdale", "energy": 6.1601, "range": 2.88475e-4,
+                      "start": "non_adhesive"},
+            phase=[{"force": 5.07845, "relaxed": True},
+                   {"duration": 1.0, "steps": steps, "force": -69.6304, "ramp": "linear"}],
+            solver={"tolerance": 1e-6, "max_iterations": 5000})
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # the patches are one cell across
+            rows = list(asperity.Simulation(case))
+        assert rows[-1].force == pytest.approx(-69.6304, rel=1e-9)
+        gaps.append(rows[-1].mean_gap)
+    assert gaps[1] == pytest.approx(gaps[0], rel=1e-5)
+
+
+def test_a_pull_without_an_equilibrium_separates_the_surfaces():
+    height = 1e-7 * np.cos(2 * np.pi * np.arange(16) / 16)[None, :] * np.ones((16, 1))
+    with pytest.raises(asperity.NotConverged, match="detached"):
+        asperity.solve_adhesive(height, 1e-6, None, 1e6, pressure=-2e6, potential="exponential",
+                                energy=0.02, range=2e-8, start="full_contact")
