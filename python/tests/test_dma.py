@@ -479,6 +479,26 @@ def test_overloads_are_left_out(tmp_path):
     assert "2 of 8 points have no value" in " ".join(table.notes)
 
 
+def test_vertical_shifts_of_noisy_sweeps_do_not_shorten_the_overlap():
+    """In a short overlap wrong shifts can fit better than the noise lets the right ones fit."""
+    tau = np.logspace(-8, 3, 45)
+    rubber = Prony(0.8e6, 0.9e6 * np.exp(-(((np.log10(tau) + 4.5) / 2) ** 2)), tau)
+    temperatures = np.array([-30.0, -20, -10, 0, 10, 20, 40, 60])
+    omega = TWO_PI * np.logspace(-1, 2, 13)
+    exact = [rubber.shifted(t, SHIFT) for t in temperatures]
+    for seed in range(12):
+        factors = noise(seed, (2, 8, omega.size), 0.03)
+        storage = [one.storage_modulus(omega) * factor
+                   for one, factor in zip(exact, factors[0], strict=True)]
+        loss = [one.loss_modulus(omega) * factor
+                for one, factor in zip(exact, factors[1], strict=True)]
+        curve = asperity.material.master_curve(temperatures, [omega] * 8, storage, loss, 20.0,
+                                               vertical=True)
+        np.testing.assert_allclose(curve.log_shift, np.log10(SHIFT.shift_factor(temperatures)),
+                                   atol=0.6, err_msg=str(seed))
+        np.testing.assert_allclose(curve.log_vertical, 0.0, atol=0.2)
+
+
 def test_vertical_shifts_are_found_and_written(tmp_path):
     """A rubber whose moduli grow with the temperature: a_T and b_T come back."""
     rubber, wlf = Prony(1e6, [2e6, 4e6, 2e6], [1e-3, 1e-2, 1e-1]), WLF(8.0, 120.0, 20.0)

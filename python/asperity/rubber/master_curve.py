@@ -155,7 +155,10 @@ def _overlay(
 ) -> tuple[float, float, float]:
     """Return the shifts that make `moving` overlap `fixed`, and the mean square that remains.
 
-    The shifts are those of log10 of the frequency and of log10 of the modulus.
+    The shifts are those of log10 of the frequency and of log10 of the modulus. With a vertical
+    shift even curves that do not belong together can be brought close in a short overlap, closer
+    than the noise of the measurement leaves the right ones. Of all minima, the one with the least
+    mean square over the length of its overlap is therefore chosen.
     """
     x_fixed, y_fixed = fixed
     x_moving, y_moving = moving
@@ -178,7 +181,14 @@ def _overlay(
     lowest = x_fixed[0] - x_moving[-1] + margin
     highest = x_fixed[-1] - x_moving[0] - margin
     trial = np.linspace(lowest, highest, 401)
-    near = int(np.argmin([distance(s) for s in trial]))
+    apart_at = np.array([distance(s) for s in trial])
+    if vertical:
+        overlap = (np.minimum(x_fixed[-1], x_moving[-1] + trial)
+                   - np.maximum(x_fixed[0], x_moving[0] + trial))
+        around = np.pad(apart_at, 1, constant_values=np.inf)
+        is_minimum = (apart_at <= around[:-2]) & (apart_at <= around[2:])
+        apart_at = np.where(is_minimum, apart_at / overlap, np.inf)
+    near = int(np.argmin(apart_at))
     bounds = (trial[max(near - 1, 0)], trial[min(near + 1, trial.size - 1)])
     found = minimize_scalar(distance, bounds=bounds, method="bounded", options={"xatol": 1e-8})
     rise = -float(apart(float(found.x)).mean()) if vertical else 0.0

@@ -68,13 +68,14 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
             for index, colour in enumerate(distinct_colours(colours.size)):
                 _draw_line(curve, plan, places, plan.where(row, index), colour)
             if count > 1:
-                _name_row(places[0], _words(plan.rows, float(plan.values(plan.rows)[row])))
+                places[0].set_ylabel(_words(plan.rows, float(plan.values(plan.rows)[row])),
+                                     fontweight="bold")
         _dress(curve, plan, grid)
         for index, colour in enumerate(distinct_colours(colours.size)):
             label = _words(plan.colours, float(colours[index])) if colours.size > 1 else "runs"
             grid[0, 0].plot([], [], "o-", color=colour, label=label)
         _legend(figure, grid[0, 0], plan)
-        figure.suptitle(str(curve.settings.get("title", "")), parse_math=False)
+        figure.suptitle("\n".join(filter(None, _titles(curve, plan))), parse_math=False)
     return shown_once(figure)
 
 
@@ -160,11 +161,14 @@ def _draw_line(curve: FrictionCurve, plan: _Plan, places: NDArray[Any],
                        markersize=7)
 
 
-def _name_row(panel: Axes, text: str) -> None:
-    """Write the value of a row of panels into its first panel."""
-    panel.annotate(text, (0.0, 1.0), (4.0, -4.0), xycoords="axes fraction",
-                   textcoords="offset points", va="top", fontweight="bold", fontsize="small",
-                   bbox={"facecolor": "w", "edgecolor": "none", "alpha": 0.8, "pad": 1.0})
+def _titles(curve: FrictionCurve, plan: _Plan) -> tuple[str, str]:
+    """Return the title of a picture, and the conditions that are the same at all its points."""
+    same = [_words(name, float(values[0])) for name, values in plan.axes.items()
+            if name != plan.along and values.size == 1 and np.isfinite(values[0])]
+    coefficient = float(curve.settings.get("coefficient", 0.0))
+    if coefficient:
+        same.append(f"coefficient {coefficient:g} in the interface")
+    return str(curve.settings.get("title", "")), ", ".join(same)
 
 
 def _dress(curve: FrictionCurve, plan: _Plan, grid: NDArray[Any]) -> None:
