@@ -32,6 +32,7 @@ _MARKERS = "o", "x"  # of points with warnings, and of those with states that ar
 _LEGEND_COLUMNS = 4
 _MOST_KEYS = 4          # interval, theory and the two markers
 _LEGEND_ROW = 0.16      # height of a row of the legend, inches
+_TITLE_ROW = 0.2        # height of a second line of the title, inches
 _ONLY_ROW = 2.5         # height of the panels if there is a single row, inches
 _ROW = 2.1              # and of each of several rows
 _FEW_DECADES = 1000.0   # ratio of the ends of an axis up to which 1, 2 and 5 are labelled
@@ -60,7 +61,8 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
     legend = -(-keys // _LEGEND_COLUMNS)
     count = plan.values(plan.rows).size
     with print_style():
-        height = _ROW * count if count > 1 else _ONLY_ROW
+        titles = [line for line in _titles(curve, plan) if line]
+        height = (_ROW * count if count > 1 else _ONLY_ROW) + _TITLE_ROW * (len(titles) > 1)
         figure, grid = plt.subplots(
             count, len(plan.panels), layout="constrained", squeeze=False, sharex=True, sharey="col",
             figsize=(DOUBLE_COLUMN, height + _LEGEND_ROW * legend))
@@ -75,7 +77,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
             label = _words(plan.colours, float(colours[index])) if colours.size > 1 else "runs"
             grid[0, 0].plot([], [], "o-", color=colour, label=label)
         _legend(figure, grid[0, 0], plan)
-        figure.suptitle("\n".join(filter(None, _titles(curve, plan))), parse_math=False)
+        figure.suptitle("\n".join(titles), parse_math=False)
     return shown_once(figure)
 
 
