@@ -828,6 +828,14 @@ def test_arguments_of_another_type_are_named(tmp_path):
         fit_dma(read_dma(path), wlf=3.0)
 
 
+@pytest.mark.parametrize(("head", "noted"), [("T", True), ("T (K)", False), ("T (C)", False)])
+def test_temperatures_that_may_be_in_kelvin_are_noted(tmp_path, head, noted):
+    path = write(tmp_path / "dma.csv", f"{head},f (Hz),G' (MPa),G'' (MPa)",
+                 [[t, f, 2.0, 0.5] for t in (273.0, 293.0) for f in (1.0, 10.0, 100.0)])
+    notes = read_dma(path).notes
+    assert any("temperatures from 273 to 293 C are unusual" in note for note in notes) == noted
+
+
 def test_moduli_of_two_kinds_are_refused(tmp_path):
     path = tmp_path / "mixed.csv"
     path.write_text("f (Hz),E' (MPa),G'' (MPa)\n1,2.4,0.03\n10,2.5,0.05\n")

@@ -30,6 +30,7 @@ __all__ = ["DmaTable", "read_dma"]
 FloatArray = NDArray[np.float64]
 
 _MOST_FAULTS = 10
+_HOT = 150.0            # C; a sweep whose temperatures all lie above is probably in kelvin
 _LARGEST_SPREAD = 1.5   # of storage moduli that are measured at one frequency and temperature
 
 
@@ -166,7 +167,8 @@ def read_dma(
     temperature = None
     if "temperature" in places:
         temperature = values["temperature"] + to_celsius
-        _check_temperatures(path, body, temperature)
+        has_unit = bool(temperature_unit or found_units.get("temperature"))
+        notes += _check_temperatures(path, body, temperature, has_unit)
     else:
         notes += _repeated(values["frequency"], storage)
     return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
@@ -192,13 +194,18 @@ def _to_shear(kind: str | None, named: str | None, poisson: float) -> tuple[floa
         " for tension, where G = E/(2 (1 + poisson)), give kind = 'tension' (--kind tension)"]
 
 
-def _check_temperatures(path: Path, body: Rows, temperature: FloatArray) -> None:
-    """Refuse temperatures that do not exist, because the unit of their column is wrong."""
+def _check_temperatures(path: Path, body: Rows, temperature: FloatArray, has_unit: bool
+                        ) -> list[str]:
+    """Refuse temperatures that do not exist; return a note on those that are probably in kelvin."""
     at = int(np.argmin(temperature))
     if temperature[at] < ABSOLUTE_ZERO:
         raise ValueError(f"{path}: line {body[at][0]}: temperature = {temperature[at]:g} C: must"
                          f" be >= {ABSOLUTE_ZERO:g} C; look at the unit of the column"
                          " (temperature_unit, --temperature-unit)")
+    if has_unit or temperature.min() <= _HOT:
+        return []
+    return [f"temperatures from {temperature.min():g} to {temperature.max():g} C are unusual: if"
+            " they are in kelvin, say so (temperature_unit = 'K', --temperature-unit K)"]
 
 
 def _repeated(frequency: FloatArray, storage: FloatArray) -> list[str]:
