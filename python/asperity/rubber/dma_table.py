@@ -150,9 +150,8 @@ def read_dma(
     if found_units.get("storage") is None and "loss" in places:  # one unit counts for both
         found_units["storage"] = found_units.get("loss")
     to_pascal = unit("storage", modulus_unit, MODULUS_UNITS, "Pa")
-    to_celsius = 0.0
-    if "temperature" in places:
-        to_celsius = unit("temperature", temperature_unit, TEMPERATURE_UNITS, "C")
+    to_celsius = (unit("temperature", temperature_unit, TEMPERATURE_UNITS, "C")
+                  if "temperature" in places else 0.0)
     values = _numbers(path, body, places)
     storage = to_pascal * values["storage"]
     if "loss" in places:
