@@ -828,6 +828,14 @@ def test_arguments_of_another_type_are_named(tmp_path):
         fit_dma(read_dma(path), wlf=3.0)
 
 
+def test_decimal_commas_whose_zeros_are_left_out_are_no_thousands(tmp_path):
+    path = tmp_path / "dma.csv"
+    path.write_text("f (Hz);G' (MPa);G'' (MPa)\n1;2,345;1,234\n3,162;2,456;1,345\n10;2,567;1,456\n")
+    table = read_dma(path)
+    np.testing.assert_allclose(table.omega, TWO_PI * np.array([1.0, 3.162, 10.0]))
+    np.testing.assert_allclose(table.storage, 1e6 * np.array([2.345, 2.456, 2.567]))
+
+
 @pytest.mark.parametrize(("head", "noted"), [("T", True), ("T (K)", False), ("T (C)", False)])
 def test_temperatures_that_may_be_in_kelvin_are_noted(tmp_path, head, noted):
     path = write(tmp_path / "dma.csv", f"{head},f (Hz),G' (MPa),G'' (MPa)",

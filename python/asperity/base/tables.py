@@ -8,8 +8,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["Rows", "cells_of", "decimals", "doubtful_number", "heads_of_comment", "is_comment",
-           "is_missing", "is_number", "text_lines", "text_of"]
+__all__ = ["Rows", "cells_of", "decimals", "doubtful_number", "has_quoted_cells",
+           "heads_of_comment", "is_comment", "is_missing", "is_number", "text_lines", "text_of"]
 
 Rows = list[tuple[int, list[str]]]
 
@@ -19,6 +19,7 @@ _PLAIN_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
 _SMALL = re.compile(r"[-+]?\d{1,3}")
 _THOUSANDS_BY_POINT = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+,\d+(?:[eE][-+]?\d+)?")
 _POINT = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+_MANY = 100             # commas that show by their number that they separate thousands
 
 #: Errors of a spreadsheet in English and German; the sign # does not make a line of them a comment.
 _ERRORS = re.compile(r"#(?:n/?a|nv|null!|num!|zahl!|div/0!|value!|wert!|ref!|bezug!)", re.I)
@@ -164,12 +165,13 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def decimals(rows: Rows) -> Rows:
+def decimals(rows: Rows, least: int = _MANY) -> Rows:
     """Return the cells with decimal points, and without separators of thousands.
 
-    A comma is the decimal sign, unless other cells have decimal points, or all commas of the table
-    stand before three digits and the same column has whole numbers below 1000: then it separates
-    thousands.
+    A comma is the decimal sign, unless other cells have decimal points, or all of at least `least`
+    commas stand before three digits and the same column has whole numbers below 1000: then it
+    separates thousands. (Where decimal numbers lose their last zeros, some of many have fewer than
+    three decimals.)
 
     Examples
     --------
@@ -179,10 +181,10 @@ def decimals(rows: Rows) -> Rows:
     [(1, ['0.5', '943120'])]
     >>> decimals([(1, ["0,5", "1.943,5"])])
     [(1, ['0.5', '1943.5'])]
-    >>> decimals([(1, ["943,120"]), (2, ["87"])])
+    >>> decimals([(1, ["943,120"]), (2, ["87"])], least=1)
     [(1, ['943120']), (2, ['87'])]
     """
-    points = _has_thousands(rows) or any(
+    points = _has_thousands(rows, least) or any(
         _POINT.fullmatch(cell) or (_THOUSANDS.fullmatch(cell) and "." in cell)
         for _, cells in rows for cell in cells)
 
@@ -200,7 +202,7 @@ def decimals(rows: Rows) -> Rows:
     return [(at, [plain(cell) for cell in cells]) for at, cells in rows]
 
 
-def _has_thousands(rows: Rows) -> bool:
+def _has_thousands(rows: Rows, least: int) -> bool:
     """Return whether all commas separate thousands, because of whole numbers below 1000 there."""
     if not any("," in cell for _, cells in rows for cell in cells):
         return False
@@ -208,35 +210,45 @@ def _has_thousands(rows: Rows) -> bool:
                if is_number(cell)]
     with_comma = [(column, cell) for column, cell in numbers if "," in cell]
     columns = {column for column, _ in with_comma}
-    return (all(_PLAIN_THOUSANDS.fullmatch(cell) for _, cell in with_comma)
+    return (len(with_comma) >= least
+            and all(_PLAIN_THOUSANDS.fullmatch(cell) for _, cell in with_comma)
             and any(_SMALL.fullmatch(cell) for column, cell in numbers if column in columns))
 
 
+def has_quoted_cells(lines: Sequence[tuple[int, str]]) -> bool:
+    r"""Return whether cells stand in quotation marks between commas, as in English spreadsheets.
+
+    Examples
+    --------
+    >>> has_quoted_cells([(1, '"12,975","19"')]), has_quoted_cells([(1, '"12,975";"19"')])
+    (True, False)
+    """
+    return any(re.search(r'"\s*,\s*"', line) for _, line in lines)
+
+
 def doubtful_number(lines: Sequence[tuple[int, str]]) -> str:
-    r"""Return a number of which the comma may be the decimal sign or separate thousands.
+    """Return a number of which the comma may be the decimal sign or separate thousands.
 
     Parameters
     ----------
     lines : sequence of (int, str)
-        The lines of a table with their numbers.
+        The lines of a table, with their numbers in the file. Its cells stand in quotation marks
+        between commas (`has_quoted_cells`).
 
     Returns
     -------
     str
-        The number, or an empty string if there is no doubt. Doubtful are tables whose cells stand
-        in quotation marks between commas, if all commas in the cells stand before three digits and
-        no cell is a whole number below 1000.
+        The number, or an empty string if there is no doubt. Doubtful are tables in which all commas
+        in cells stand before three digits, and no cell is a whole number below 1000.
 
     Examples
     --------
     >>> doubtful_number([(1, '"12,975","19,845"')]), doubtful_number([(1, '"12,975","0,845"')])
     ('12,975', '')
     """
-    if not any(re.search(r'"\s*,\s*"', line) for _, line in lines):
-        return ""
     rows = cells_of(lines)
     numbers = [cell for _, cells in rows for cell in cells if is_number(cell)]
     with_comma = [cell for cell in numbers if "," in cell]
-    clear = (_has_thousands(rows) or any("." in cell for cell in numbers)
+    clear = (_has_thousands(rows, 1) or any("." in cell for cell in numbers)
              or not all(_PLAIN_THOUSANDS.fullmatch(cell) for cell in with_comma))
     return "" if clear or not with_comma else with_comma[0]

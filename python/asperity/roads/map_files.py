@@ -22,6 +22,7 @@ from ..base.tables import (
     cells_of,
     decimals,
     doubtful_number,
+    has_quoted_cells,
     heads_of_comment,
     is_missing,
     is_number,
@@ -224,12 +225,13 @@ def text_table(path: Path) -> tuple[FloatArray, list[str]]:
         heading, but not a line of numbers with a typing error.
     """
     lines = text_lines(path)
-    doubtful = doubtful_number(lines)
+    quoted = has_quoted_cells(lines)
+    doubtful = doubtful_number(lines) if quoted else ""
     if doubtful:
         raise ValueError(f"{path}: {doubtful} may be a decimal number or one with a comma between"
                          " thousands: write the numbers with decimal points and without other"
                          " commas")
-    rows = decimals(cells_of(lines))
+    rows = decimals(cells_of(lines), 1) if quoted else decimals(cells_of(lines))
     first = next((i for i, (_, cells) in enumerate(rows)
                   if any(map(is_number, cells)) and all(map(is_value, cells))), None)
     if first is None:
