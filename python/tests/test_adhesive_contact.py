@@ -1,5 +1,6 @@
 """Adhesive contact on numpy arrays, against theory and against the program."""
 
+import re
 import signal
 import subprocess
 import warnings
@@ -438,8 +439,14 @@ def test_a_long_step_does_not_separate_surfaces_that_still_hold():
     assert gaps[1] == pytest.approx(gaps[0], rel=1e-5)
 
 
-def test_a_pull_without_an_equilibrium_separates_the_surfaces():
-    height = 1e-7 * np.cos(2 * np.pi * np.arange(16) / 16)[None, :] * np.ones((16, 1))
-    with pytest.raises(asperity.NotConverged, match="detached"):
-        asperity.solve_adhesive(height, 1e-6, None, 1e6, pressure=-2e6, potential="exponential",
-                                energy=0.02, range=2e-8, start="full_contact")
+@pytest.mark.parametrize("potential", ["exponential", "gauss", "maugis_dugdale"])
+@pytest.mark.parametrize("pull", [5e6, 1e7])
+def test_a_pull_without_an_equilibrium_separates_the_surfaces(potential, pull):
+    """The search with short steps finds nothing and does not go on to the limit of iterations."""
+    length = 128 * 1.5e-9
+    height = asperity.surface.self_affine(128, lx=length, wavelength_long=length / 4,
+                                          wavelength_short=2e-8, rms_slope=1.0, seed=1)
+    with pytest.raises(asperity.NotConverged, match="detached") as caught:
+        asperity.solve_adhesive(height, length, None, 25e6, pressure=-pull, potential=potential,
+                                energy=0.05, range=2.071e-9, start="full_contact")
+    assert int(re.search(r"after (\d+) iterations", str(caught.value))[1]) < 300

@@ -176,6 +176,8 @@ contains
 
       fields = 12.7_dp
       if (case%grid%boundary == boundary_free) fields = 62.0_dp
+      ! A solve that may separate the surfaces keeps its start.
+      if (any(case%phases%control /= 'displacement' .and. case%phases%target < 0.0_dp)) fields = fields + 1.0_dp
       if (case%solver%method == 'thesis') fields = 5.4_dp
    end function adhesion_fields
 

@@ -40,7 +40,7 @@ module adhesion_cg_fast
    use adhesion_model, only : new_adhesion_model
    use adhesion_patch, only : adhesion_contact_type, is_detached, new_adhesion_patch
    use adhesion_plane, only : keep_step, make_conjugate, stretch_step
-   use adhesion_potential, only : stiffens
+   use adhesion_potential, only : has_smooth_potential, stiffens
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
@@ -66,7 +66,7 @@ module adhesion_cg_fast
    integer, parameter :: most_closings = 5     !! times that narrow gaps are closed before the end of a solve
    integer, parameter :: most_failures = 8      !! successive directions without a step
    integer, parameter :: most_calm = 8          !! largest number of good steps before longer ones are tried again
-   integer, parameter :: careful = 4            !! least caution of the second descent, if the first has left the contact
+   integer, parameter :: careful(2) = [1, 3]     !! least caution of the second descent, if the first has left the contact
    real(dp), parameter :: short = 0.01_dp       !! if a smaller part of a step is taken, the model was wrong
    real(dp), parameter :: negligible = 0.01_dp  !! round-off of a traction, over the tolerance of the residual
    real(dp), parameter :: still = 0.01_dp       !! relative change of a residual that hardly changes
@@ -137,9 +137,10 @@ contains
          call restore_start(self, contact, start)
          contact%level = level_before
          call begin_iteration(self, contact, now)
-         now%least_caution = careful
-         now%caution = careful
+         now%least_caution = merge(careful(1), careful(2), has_smooth_potential(contact%problem%potential))
+         now%caution = now%least_caution
          call minimise(self, now, outcome)
+         if (.not. (outcome%converged .or. outcome%stopped)) outcome%reason = reason_detached
       end if
       if (outcome%stopped) return
 
