@@ -471,6 +471,16 @@ def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program, capsy
     assert table.failed == [] and table.runs[0].finished
 
 
+def test_a_result_that_cannot_be_read_is_made_anew(tmp_path):
+    """Another process may be writing such a file: a run first tries to continue it."""
+    parameters = {"phase[1].pressure": [1e3, 2e3]}
+    first, second = sweep(sliding(), parameters, folder=tmp_path).paths
+    first.write_bytes(b"")
+    second.write_bytes(second.read_bytes()[:3000])
+    table = sweep(sliding(), parameters, folder=tmp_path)
+    assert table.failed == [] and all(run.finished for run in table.runs)
+
+
 @pytest.mark.parametrize("by_executor", [False, True])
 def test_cases_that_another_sweep_completes_are_not_run_again(tmp_path, monkeypatch, by_executor):
     """While the first of three cases is counted, another sweep completes all of them."""

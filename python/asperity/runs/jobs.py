@@ -25,7 +25,7 @@ from .case import Case
 from .progress import Progress
 
 __all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "end_of", "environment", "found_result",
-           "is_done", "run_here", "take_end", "text_of", "write_input"]
+           "is_done", "may_continue", "run_here", "take_end", "text_of", "write_input"]
 
 _map_checksum = call("map_checksum")
 
@@ -35,7 +35,8 @@ _PATIENCE = 60.0        # time that a stopped process has for its checkpoint, s
 _PAUSE = 1.0            # before a case that another process is running is looked at again, s
 # Words of the program about a file from which it cannot continue, with status 3. Other causes of
 # this status, such as a full disk, leave the checkpoint as it is for the next call.
-UNSUITABLE = ("damaged", "is empty", "no checkpoint", "nothing to continue", "not an HDF5 file")
+UNSUITABLE = ("damaged", "is empty", "its end is missing", "no checkpoint", "nothing to continue",
+              "not an HDF5 file")
 
 
 @dataclass
@@ -90,6 +91,21 @@ def found_result(job: Job) -> Run | None:
     except OSError:
         return None
     return run if run.input == text_of(job) and _has_the_same_maps(run, job) else None
+
+
+def may_continue(job: Job) -> bool:
+    """Return whether a run should try to continue before it begins anew.
+
+    This is so where the result is of the same input, and where the file cannot be read: another
+    process may be writing it, and may have completed it before our run looks at it.
+    """
+    try:
+        open_result(job.path)
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return found_result(job) is not None
 
 
 def _has_the_same_maps(run: Run, job: Job) -> bool:
@@ -190,7 +206,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
                         count(job)
                     elif not stops.asked:
                         running.append(job)
-                        _start(job, command, threads, resume and found_result(job) is not None)
+                        _start(job, command, threads, resume and may_continue(job))
                         progress.show(len(running))
                 for job in list(running):
                     assert job.process is not None

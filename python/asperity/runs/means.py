@@ -23,7 +23,7 @@ from .jobs import (
     begins_again,
     end_of,
     environment,
-    found_result,
+    may_continue,
     run_here,
     take_end,
     write_input,
@@ -205,7 +205,7 @@ def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> No
 def _submit_to_executor(job: Job, means: Means) -> Future[tuple[int, str]]:
     """Write the input of a job, and let the executor run it."""
     assert means.executor is not None
-    restart = means.resume and found_result(job) is not None
+    restart = means.resume and may_continue(job)
     path = write_input(job).resolve()
     job.started = time.monotonic()
     return means.executor.submit(run_file, str(path), means.threads, restart)
