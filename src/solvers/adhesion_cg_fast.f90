@@ -32,7 +32,7 @@
 !> residual, change, image, the step before and its product, curvature, state and traction of the model. In free mode
 !> the spectrum and the work fields, except the curvature, have 4 times the cells. There are three more such fields: the
 !> state, the traction and psi. The true operator takes three fields of the patch. Transforms are then counted in those
-!> of the doubled grid.
+!> of the doubled grid. Under a pull by a prescribed force, one more field keeps the start.
 module adhesion_cg_fast
    use adhesion_closing, only : close_carried_gaps
    use adhesion_descent, only : approach_minimum, keeps_sum

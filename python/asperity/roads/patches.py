@@ -71,7 +71,7 @@ class Patch:
         """
         path = folder / f"patch-{self.code}.h5"
         if path.exists() and not self._is_in(path):
-            path.unlink()
+            path.unlink(missing_ok=True)  # another process may have done so
         if not path.exists():
             surface = MeasuredSurface(
                 self.height, self.lx, self.ly, True, "m",

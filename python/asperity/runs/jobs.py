@@ -12,7 +12,8 @@ import subprocess
 import tempfile
 import threading
 import time
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import FrameType
 from typing import IO, Any
@@ -24,8 +25,8 @@ from . import namelists
 from .case import Case
 from .progress import Progress
 
-__all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "end_of", "environment", "found_result",
-           "is_done", "may_continue", "run_here", "take_end", "text_of", "write_input"]
+__all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result", "is_done",
+           "may_continue", "new_ends", "run_here", "take_end", "text_of", "write_input"]
 
 _map_checksum = call("map_checksum")
 
@@ -62,24 +63,31 @@ def is_done(job: Job) -> bool:
     return run is not None and run.finished and run.version == version()
 
 
-def end_of(job: Job) -> int | None:
-    """Return the exit status with which a run of the same input has ended for good, or None.
-
-    It is 0 where the result is complete, and 4 where a solver did not converge.
-    """
-    if is_done(job):
-        return 0
-    run = found_result(job)
-    return 4 if run is not None and not run.finished and "converge" in run.outcome else None
-
-
 def take_end(job: Job) -> bool:
-    """Record the end of a run that another process has made; return whether there is one."""
-    status = end_of(job)
-    if status is None:
+    """Record the end of a run of the same input, if there is one, and return whether there is.
+
+    Its result is complete (status 0), or a solver did not converge (status 4).
+    """
+    run = found_result(job)
+    if run is None:
         return False
-    job.status, job.message = status, open_result(job.path).outcome if status else ""
-    return True
+    if run.finished and run.version == version():
+        job.status, job.message = 0, ""
+        return True
+    if not run.finished and "converge" in run.outcome:
+        job.status, job.message = 4, run.outcome
+        return True
+    return False
+
+
+def new_ends(waiting: list[Job], resume: bool) -> Callable[[Job], bool]:
+    """Return a function that takes the end of a job if another process makes it from now on.
+
+    Results that are there already are not taken: they do not count, or the job would not wait.
+    Without `resume` all jobs are run in any case.
+    """
+    old = {job.name for job in waiting if resume and take_end(replace(job))}
+    return lambda job: resume and job.name not in old and take_end(job)
 
 
 def found_result(job: Job) -> Run | None:
@@ -187,10 +195,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
     """
     queue = list(waiting)
     running: list[Job] = []
-    old = {job.name for job in waiting if end_of(job) is not None}
-
-    def is_ended(job: Job) -> bool:
-        return resume and job.name not in old and take_end(job)
+    take_new_end = new_ends(waiting, resume)
 
     def count(job: Job) -> None:
         progress.done(job.name, job.message if job.status else None,
@@ -202,7 +207,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
                 ready = [job for job in queue if job.due <= time.monotonic()]
                 for job in ready[:side_by_side - len(running)]:
                     queue.remove(job)
-                    if is_ended(job):
+                    if take_new_end(job):
                         count(job)
                     elif not stops.asked:
                         running.append(job)
@@ -212,7 +217,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
                     assert job.process is not None
                     if job.process.poll() is None:
                         continue
-                    if _finish(job) and not is_ended(job):
+                    if _finish(job) and not take_new_end(job):
                         _start(job, command, threads, restart=False)
                         continue
                     running.remove(job)

@@ -21,11 +21,10 @@ from .jobs import (
     Job,
     Stops,
     begins_again,
-    end_of,
     environment,
     may_continue,
+    new_ends,
     run_here,
-    take_end,
     write_input,
 )
 from .program import program
@@ -176,7 +175,7 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
 def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> None:
     """Submit the jobs to the executor, as many at a time as allowed, and wait for all of them."""
     ready = list(waiting)
-    old = {job.name for job in waiting if end_of(job) is not None}
+    take_new_end = new_ends(waiting, means.resume)
     running: dict[Future[tuple[int, str]], Job] = {}
     most = means.side_by_side or len(ready)
     with Stops() as stops:
@@ -184,7 +183,7 @@ def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> No
             while (ready or running) and not stops.asked:
                 while ready and len(running) < most:
                     job = ready.pop(0)
-                    if means.resume and job.name not in old and take_end(job):
+                    if take_new_end(job):
                         progress.done(job.name, job.message if job.status else None, 0.0,
                                       len(ready) + len(running))
                     else:
