@@ -19,6 +19,7 @@ from conftest import PATIENCE
 from viscoelastic_case import wait_for_rows
 
 import asperity
+from asperity.runs import means, progress
 from asperity.sweep_table import Failure
 
 AMPLITUDE, LENGTH, MODULUS = 1e-6, 1e-3, 4e6
@@ -485,7 +486,7 @@ def test_a_result_that_cannot_be_read_is_made_anew(tmp_path):
 def test_cases_that_another_sweep_completes_are_not_run_again(tmp_path, monkeypatch, by_executor):
     """While the first of three cases is counted, another sweep completes all of them."""
     parameters = {"phase[1].pressure": [1e3, 2e3, 3e3]}
-    done = asperity.runs.progress.Progress.done
+    done = progress.Progress.done
     made = {}
 
     def count(self, *arguments):
@@ -495,13 +496,25 @@ def test_cases_that_another_sweep_completes_are_not_run_again(tmp_path, monkeypa
                 made[path] = (path.stat().st_ino, path.stat().st_mtime_ns)
         done(self, *arguments)
 
-    monkeypatch.setattr(asperity.runs.progress.Progress, "done", count)
+    monkeypatch.setattr(progress.Progress, "done", count)
     with ThreadPoolExecutor(1) as executor:
         table = sweep(sliding(), parameters, folder=tmp_path, jobs=1,
                       executor=executor if by_executor else None)
     assert table.failed == [] and all(run.finished for run in table.runs)
     for path in table.paths:
         assert (path.stat().st_ino, path.stat().st_mtime_ns) == made[path], path.name
+
+
+def test_a_worker_keeps_a_result_that_was_completed_before_it_started(tmp_path):
+    """The worker was told to continue, but another process has completed the case meanwhile."""
+    path = sweep(sliding(), {"phase[1].pressure": [1e3]}, folder=tmp_path).paths[0]
+    made = (path.stat().st_ino, path.stat().st_mtime_ns)
+    case = path.with_suffix(".nml")
+    assert means.run_file(str(case), 1, restart=True) == (0, "")
+    assert (path.stat().st_ino, path.stat().st_mtime_ns) == made
+    case.write_text(case.read_text().replace("1000.0", "2000.0"))
+    assert means.run_file(str(case), 1, restart=True) == (0, "")
+    assert asperity.open(path).history.pressure[-1] == pytest.approx(2e3)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux")

@@ -16,12 +16,14 @@ from typing import NamedTuple
 
 from ..base.check import number_of_threads, shown, whole
 from ..base.files import write_text
+from .case import Case
 from .jobs import (
     UNSUITABLE,
     Job,
     Stops,
     begins_again,
     environment,
+    is_done,
     may_continue,
     new_ends,
     run_here,
@@ -143,6 +145,9 @@ def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means)
 def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
     """Run an input file. The workers of an executor call this function.
 
+    Between the order and the start of the work, another process may complete the same case. Its
+    result is then kept.
+
     Parameters
     ----------
     path : str
@@ -169,6 +174,8 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
         printed = done.stderr.decode(errors="replace").strip()
         if not begins_again(done.returncode, printed):
             break
+        if restart and is_done(Job({}, Case.read(file), file.stem, result)):
+            return 0, ""
     return done.returncode, printed
 
 
