@@ -846,9 +846,25 @@ def test_temperatures_that_may_be_in_kelvin_are_noted(tmp_path, head, noted):
 
 def test_moduli_of_two_kinds_are_refused(tmp_path):
     path = tmp_path / "mixed.csv"
-    path.write_text("f (Hz),E' (MPa),G'' (MPa)\n1,2.4,0.03\n10,2.5,0.05\n")
+    path.write_text("f (Hz),E' (MPa),G'' (MPa)\n1,2.4,0.03\n10,2.5,0.05\n99,2.7,0.09\n")
     with pytest.raises(ValueError, match="\"E' \\(MPa\\)\" and \"G'' \\(MPa\\)\" are moduli of"):
         read_dma(path)
+    np.testing.assert_allclose(read_dma(path, kind="tension").storage, [8e5, 8e5 * 2.5 / 2.4, 9e5])
+
+
+@pytest.mark.parametrize(("tan_delta", "noted"), [
+    (["0.250", "0.300", "0.500"], False), (["0.25", "OVL", "-"], False),
+    (["0.25", "0.30", "5.00"], False), (["2.5", "3.0", "5.0"], True),
+    (["0.25", "0.36", "0.60"], True)])
+def test_a_tan_delta_that_contradicts_the_moduli_is_noted(tmp_path, tan_delta, noted):
+    """One wrong cell is no contradiction: the moduli are used in any case."""
+    path = tmp_path / "dma.csv"
+    rows = zip(["1,2,0.5", "10,3,0.9", "99,4,2"], tan_delta, strict=True)
+    path.write_text("\n".join(["f (Hz),G' (MPa),G'' (MPa),tan delta", *map(",".join, rows)]))
+    table = read_dma(path)
+    np.testing.assert_allclose(table.loss, [5e5, 9e5, 2e6])
+    assert any("tan delta contradicts the moduli" in note for note in table.notes) == noted
+
 
 
 @pytest.mark.parametrize(("heads", "kind", "noted"), [

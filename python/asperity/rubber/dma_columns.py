@@ -186,9 +186,12 @@ def asked_columns(columns: Mapping[str, str | int] | None) -> Mapping[str, str |
 
 def find_columns(
     path: Path, header: tuple[int, list[str]], units: list[str],
-    given: Mapping[str, str | int],
+    given: Mapping[str, str | int], kind: str | None = None,
 ) -> tuple[dict[str, int], dict[str, str | None], str | None]:
-    """Return the index and the unit of each column by role, and the kind of the moduli if named."""
+    """Return the index and the unit of each column by role, and the kind of the moduli.
+
+    The kind is `kind` if it is given. Otherwise the names of the columns say it, or None.
+    """
     heads = header[1]
     parts = [_name_and_unit(head) for head in heads]
     places = _places(path, header, parts, units, given)
@@ -204,12 +207,15 @@ def find_columns(
     if found["frequency"] == "1/s":  # means rad/s for an angular frequency, otherwise Hz
         found["frequency"] = "rad/s" if at < len(parts) and parts[at][0] in _ANGULAR else "Hz"
     found["angular"] = "yes" if at < len(parts) and parts[at][0] in _ANGULAR else None
+    if kind is not None:
+        return places, found, kind
     kinds = {role: _kind(heads[places[role]], parts[places[role]][0])
              for role in ("storage", "loss") if places.get(role, len(parts)) < len(parts)}
     if set(kinds.values()) == {"shear", "tension"}:
         raise ValueError(f"{path}: line {header[0]}: {heads[places['storage']]!r} and"
                          f" {heads[places['loss']]!r} are moduli of shear and of tension: both must"
-                         " be of the same kind")
+                         " be of the same kind; if a name is wrong, say which kind both are"
+                         " (kind, --kind)")
     return places, found, kinds.get("storage") or kinds.get("loss")
 
 
@@ -256,9 +262,8 @@ def _places(path: Path, header: tuple[int, list[str]], parts: list[tuple[str, st
                              f" {' and '.join(repr(heads[i]) for i in match)} may both be the"
                              f" {role}: say which (columns, --column {role}=NAME)")
         places[role] = match[0]
-    if "loss" in places:
-        asked = "tan_delta" in given and "loss" not in given
-        places.pop("loss" if asked else "tan_delta", None)
+    if "tan_delta" in given and "loss" not in given:
+        places.pop("loss", None)
     missing = [role for role in ("frequency", "storage") if role not in places]
     if "loss" not in places and "tan_delta" not in places:
         missing.append("loss (or tan_delta)")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, poisson_ratio
-from ..base.tables import Rows, cells_of, text_lines
+from ..base.tables import Rows, cells_of, is_number, text_lines
 from .dma_columns import (
     ABSOLUTE_ZERO,
     FREQUENCY_UNITS,
@@ -31,6 +31,7 @@ FloatArray = NDArray[np.float64]
 
 _MOST_FAULTS = 10
 _HOT = 150.0            # C; a sweep whose temperatures all lie above is probably in kelvin
+_LARGEST_MISMATCH = 1.1  # median factor between the tan delta of a table and G''/G'
 _LARGEST_SPREAD = 1.5   # of storage moduli that are measured at one frequency and temperature
 
 
@@ -133,7 +134,8 @@ def read_dma(
     asked = asked_columns(columns)
     lines = unfolded(cells_of(text_lines(path)), role_of)
     header, units, body = split_header(path, lines, asked)
-    places, found_units, found_kind = find_columns(path, header, units, asked)
+    places, found_units, kind = find_columns(path, header, units, asked, kind)
+    own_tan_delta = places.pop("tan_delta") if {"loss", "tan_delta"} <= places.keys() else None
     body, notes = _measured(body, places)
 
     def unit(role: str, given: str | None, allowed: Mapping[str, float], default: str) -> float:
@@ -153,14 +155,16 @@ def read_dma(
     to_celsius = (unit("temperature", temperature_unit, TEMPERATURE_UNITS, "C")
                   if "temperature" in places else 0.0)
     values = _numbers(path, body, places)
+    percent = 100.0 if found_units.get("tan_delta") == "%" else 1.0
     storage = to_pascal * values["storage"]
     if "loss" in places:
         own = modulus_unit is None and found_units.get("loss") is not None
         loss = values["loss"] * (unit("loss", None, MODULUS_UNITS, "Pa") if own else to_pascal)
+        if own_tan_delta is not None:
+            notes += _contradiction(body, own_tan_delta, percent * loss / storage)
     else:
-        percent = found_units.get("tan_delta") == "%"
-        loss = storage * values["tan_delta"] * (0.01 if percent else 1.0)
-    factor, said = _to_shear(kind, found_kind, poisson)
+        loss = storage * values["tan_delta"] / percent
+    factor, said = _to_shear(kind, poisson)
     storage, loss = factor * storage, factor * loss
     notes += said
     temperature = None
@@ -173,22 +177,36 @@ def read_dma(
     return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
 
 
-def _to_shear(kind: str | None, named: str | None, poisson: float) -> tuple[float, list[str]]:
-    """Return the shear modulus over a modulus of the table, and a note on its kind.
+def _contradiction(body: Rows, at: int, ratio: FloatArray) -> list[str]:
+    """Return a note if the column of tan delta contradicts G''/G', which is used instead of it.
 
     Parameters
     ----------
-    kind : str or None
-        What the caller says.
-    named : str or None
-        What the header says.
-    poisson : float
-        Poisson ratio.
+    body : list of rows
+        The rows of the table.
+    at : int
+        Index of the column of tan delta. Cells that are not a positive number are not compared.
+    ratio : ndarray, shape (n,)
+        G''/G' of each row, in the unit of the column.
     """
-    if (kind or named) == "tension":
+    found = []
+    for (line, cells), own in zip(body, ratio, strict=True):
+        text = cells[at] if at < len(cells) else ""
+        if is_number(text) and float(text) > 0.0:
+            found.append((abs(math.log(float(text) / own)), line, text, own))
+    if not found or float(np.median([one[0] for one in found])) < math.log(_LARGEST_MISMATCH):
+        return []
+    _, line, text, own = max(found)
+    return [f"tan delta contradicts the moduli, which are used (line {line}: tan delta = {text},"
+            f" loss over storage modulus = {own:.4g})"]
+
+
+def _to_shear(kind: str | None, poisson: float) -> tuple[float, list[str]]:
+    """Return the shear modulus over a modulus of the table, and a note on its kind."""
+    if kind == "tension":
         factor = 0.5 / (1.0 + poisson)
         return factor, [f"moduli in tension: G = E/(2 (1 + poisson)) = {factor:.6g} E"]
-    return 1.0, [] if kind or named else [
+    return 1.0, [] if kind else [
         "the header does not say whether the moduli are of shear or of tension: taken as shear;"
         " for tension, where G = E/(2 (1 + poisson)), give kind = 'tension' (--kind tension)"]
 
