@@ -1236,6 +1236,9 @@ def test_headings_of_a_spectrum_name_units(tmp_path, heads):
     found = road_of([f"spectrum:{tmp_path / 's.csv'}"], cells=64).whole_spectrum
     np.testing.assert_allclose(found.wavenumber, k, rtol=1e-12)
     np.testing.assert_allclose(found.psd, psd, rtol=1e-12)
+    symbol = "C" if "C" in heads else "Phi"
+    assert found.notes[0] == (
+        f"s.csv: the wave number is read in rad/um, the density as {symbol} in um4")
 
 
 def test_persson_density_of_a_profile(tmp_path):
@@ -1249,6 +1252,16 @@ def test_persson_density_of_a_profile(tmp_path):
                    delimiter=",")
         found.append(road_of([f"spectrum:{tmp_path / 's.csv'}"], cells=64).whole_spectrum.psd)
     np.testing.assert_allclose(found[1:], [found[0]] * 3, rtol=1e-9)
+
+
+def test_the_plan_says_how_a_spectrum_is_read(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "r.nml").write_text(NAMELIST)
+    (tmp_path / "s.csv").write_text("1e3,1e-15\n3e3,1e-16\n1e5,1e-21\n")
+    assert main(["friction", "spectrum:s.csv", "--material", "r.nml", "--cells", "32",
+                 "--plan"]) == 0
+    assert ("note       s.csv: the wave number is read in rad/m, the density as Phi in m4\n"
+            in capsys.readouterr().out)
 
 
 @pytest.mark.parametrize(("head", "message"), [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,19 +58,24 @@ def spectrum_of_file(path: Path) -> Spectrum:
     if re.search(r"wavelength|lambda|λ|freq|^\W*f\b(?!.*rad)", first, re.IGNORECASE):
         raise ValueError(f"{path}: column 1 is {first!r}: must be the wave number, in rad/m")
     found = _unit(path, 1, first, _WAVE_UNIT, "rad/m, 1/m, rad/mm, 1/mm, rad/um or 1/um")
-    values[:, 0] /= 1.0 if found is None else _METRES[found["length"] or found["other"]]
+    length = "m" if found is None else found["length"] or found["other"]
+    values[:, 0] /= _METRES[length]
+    read_as = f"{path.name}: the wave number is read in rad/{length}"
     found = _unit(path, 2, second, _PSD_UNIT, "m4, mm4 or um4, or m3, mm3 or um3 of a profile")
-    power = 4 if found is None else int(found["power"])
-    values[:, 1] *= 1.0 if found is None else _METRES[found["length"]] ** power
+    length, power = ("m", 4) if found is None else (found["length"], int(found["power"]))
+    values[:, 1] *= _METRES[length] ** power
+    symbol = "Phi" if power == 4 else "Phi1 of a profile"
     if re.match(r"\s*C[12]?(\b|_|D|iso)", second):
         values[:, 1] *= (2.0 * math.pi) ** (power - 2)
+        symbol = symbol.replace("Phi", "C")
+    read_as += f", the density as {symbol} in {length}{power}"
     wave, psd = values[np.argsort(values[:, 0])].T
     try:
-        if power == 3:
-            return isotropic_of_profile(wave, psd, name=path.name)
-        return Spectrum(wave, psd, path.name)
+        spectrum = (isotropic_of_profile(wave, psd, name=path.name) if power == 3
+                    else Spectrum(wave, psd, path.name))
     except ValueError as error:
         raise ValueError(f"{path}: sorted by wave number, {error}") from None
+    return replace(spectrum, notes=[read_as, *spectrum.notes])
 
 
 def _numbers(path: Path, rows: Rows) -> np.ndarray:
