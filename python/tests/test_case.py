@@ -155,6 +155,8 @@ def test_check_prints_what_the_command_prints(path, program):
     done = subprocess.run([program, "check", str(path)], capture_output=True, text=True, check=True)
     assert without_time(case.check()) == without_time(done.stdout)
     assert case.path == path
+    with pytest.raises(ValueError, match=r"^source = '': must be the path of a file"):
+        asperity.Case.read("")
     # The values must be the same, however they are written.
     again = asperity.Case.read(str(case))
     again.path = path

@@ -133,6 +133,8 @@ class Case(CaseGroups):
         OSError
             If the file cannot be read.
         """
+        if not os.fspath(source):
+            raise ValueError("source = '': must be the path of a file, or the text of an input")
         case = cls()
         if namelists.is_text(source):
             name, text = "case.nml", str(source)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.names import counted
 from ..results.derived import travel
 from ..results.settings import has_friction
 from ..roads import surface
@@ -211,7 +212,8 @@ def faulty(run: Run) -> list[str]:
                 continue
             count = int(np.sum(~np.isfinite(snapshot[name])))
             if count:
-                notes.append(f"{name} of the last snapshot is not finite in {count} cells")
+                notes.append(f"{name} of the last snapshot is not finite in"
+                             f" {counted(count, 'cell')}")
     return notes
 
 
