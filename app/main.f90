@@ -205,17 +205,17 @@ contains
                exit
             end if
 
-            if (any_process(checkpoint_asked())) then
-               call forget_checkpoint()
-               call limit%step_begins()
-               call run%save(error)
-               if (allocated(error)) exit
-               call limit%step_ends(.true.)
+            ! A checkpoint that was requested before the first row is written after it.
+            if (run%sim%state%schedule%row >= 0) then
+               if (any_process(checkpoint_asked())) then
+                  call forget_checkpoint()
+                  call run%save(error)
+                  if (allocated(error)) exit
+               end if
             end if
 
-            call limit%step_begins()
             call run%step(error)
-            call limit%step_ends(.false.)
+            call limit%note(run%longest_step, run%longest_save)
             if (run%sim%stop%given_up) cycle
             if (run%sim%state%schedule%row >= 0) call progress%update(run%sim%state%row)
             if (allocated(error)) exit

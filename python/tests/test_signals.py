@@ -212,12 +212,17 @@ def test_stop_before_the_first_row(program: str, case: Path) -> None:
         assert process.returncode in (143, -signal.SIGTERM), (process.returncode, message)
 
 
-def test_checkpoint_on_demand(program: str, case: Path) -> None:
-    """SIGUSR1 makes the run write a checkpoint, and the run continues to its end."""
+@pytest.mark.parametrize(("row", "size", "steps"), [(5, 48, 60), (0, 300, 3)])
+def test_checkpoint_on_demand(program: str, case: Path, row: int, size: int, steps: int) -> None:
+    """SIGUSR1 makes the run write a checkpoint, and the run continues to its end.
+
+    During the first row there is no state to save yet. The checkpoint is then written after it.
+    """
+    case.write_text(vc.text(steps=steps, size=size))
     result, checkpoint = case.with_suffix(".h5"), case.with_suffix(".checkpoint.h5")
     process = vc.start(program, case)
     assert not checkpoint.exists()
-    vc.wait_for_rows(process, result, 5, signal.SIGUSR1)
+    vc.wait_for_rows(process, result, row, signal.SIGUSR1)
     end = time.monotonic() + PATIENCE
     while not checkpoint.exists() and process.poll() is None and time.monotonic() < end:
         time.sleep(0.001)
@@ -229,7 +234,7 @@ def test_checkpoint_on_demand(program: str, case: Path) -> None:
     whole.write_text(case.read_text())
     assert vc.run(program, case, "--restart").returncode == 0
     process = vc.start(program, whole)
-    vc.wait_for_rows(process, whole.with_suffix(".h5"), 5, signal.SIGUSR1)
+    vc.wait_for_rows(process, whole.with_suffix(".h5"), row, signal.SIGUSR1)
     assert process.wait(PATIENCE) == 0  # the run continues
     process.communicate()
     vc.assert_same(result, whole.with_suffix(".h5"))

@@ -151,7 +151,8 @@ contains
 
    ! --- reading ------------------------------------------------------------------------------
 
-   !> Open the checkpoint of a result. It is an error if there is none or if it is not whole.
+   !> Open the checkpoint of a result. It is an error if there is none or if it is not whole, and if the run is
+   !> complete: a process that dies after its last row may leave a checkpoint that nobody needs.
    subroutine open_checkpoint(self, result_path, error)
       class(checkpoint_reader_type), intent(inout) :: self
       character(*), intent(in) :: result_path
@@ -159,14 +160,12 @@ contains
       character(:), allocatable :: path
 
       path = checkpoint_path(result_path)
-      if (.not. file_exists(path)) then
-         if (is_complete(result_path)) then
-            call fail(error, error_file, trim(result_path)//': the run is complete: there is '// &
-               'nothing to continue')
-         else
-            call fail(error, error_file, path//': there is no such file: '//trim(result_path)// &
-               ' has no checkpoint from which to continue')
-         end if
+      if (is_complete(result_path)) then
+         call fail(error, error_file, trim(result_path)//': the run is complete: there is nothing to continue')
+         return
+      else if (.not. file_exists(path)) then
+         call fail(error, error_file, path//': there is no such file: '//trim(result_path)// &
+            ' has no checkpoint from which to continue')
          return
       end if
       call check_block(path, error)

@@ -33,6 +33,8 @@ module case_run
       integer :: rows = 0                          !! rows of the whole run
       logical :: finished = .false.
       character(:), allocatable :: warnings        !! new ones, one per line; the caller clears them
+      real(dp) :: longest_step = 0.0_dp            !! wall time of a row with its output, without checkpoints, s
+      real(dp) :: longest_save = 0.0_dp            !! wall time of a checkpoint, s
       type(run_files_type), private :: files
       integer, private :: next_time = 1            !! next of the times for snapshots
       integer, private :: last_snapshot = -1       !! row of the last snapshot
@@ -63,6 +65,8 @@ contains
       self%finished = .false.
       self%next_time = 1
       self%last_snapshot = -1
+      self%longest_step = 0.0_dp
+      self%longest_save = 0.0_dp
       self%saved_at = seconds_now()
       if (is_first_process()) call refuse_overwriting(case, error)
       call agree(error)
@@ -117,7 +121,9 @@ contains
    subroutine step_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
+      real(dp) :: before
 
+      before = seconds_now()
       call self%sim%advance(error)
       call agree(error)
       if (allocated(error) .or. self%sim%stop%given_up) return
@@ -125,6 +131,7 @@ contains
       call collect_warnings(self)
       call self%files%write_row(self%sim, error)
       if (snapshot_due(self)) call snapshot(self, error)
+      self%longest_step = max(self%longest_step, seconds_now() - before)
       if (.not. self%sim%converged) then
          call end_unconverged(self, error)
       else if (self%finished) then
@@ -199,13 +206,17 @@ contains
       end associate
    end function checkpoint_due
 
-   !> Write a checkpoint of the state after the last row.
+   !> Write a checkpoint of the state after the last row. Before the first row there is nothing to write.
    subroutine save_run(self, error)
       class(run_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is written
+      real(dp) :: before
 
+      if (self%sim%state%schedule%row < 0) return
+      before = seconds_now()
       call self%files%save(self%sim, error)
       self%saved_at = seconds_now()
+      self%longest_save = max(self%longest_save, self%saved_at - before)
    end subroutine save_run
 
    !> Stop between two steps: write a snapshot of the present state, and a checkpoint. A restart removes a
@@ -221,8 +232,8 @@ contains
          call self%files%write_outcome('stopped before the first row', error)
       else
          call self%files%write_outcome('stopped after step '//to_text(self%sim%state%row%step), error)
-         call self%save(error)
       end if
+      call self%save(error)
    end subroutine interrupt_run
 
    !> Close the result and free everything.

@@ -317,7 +317,8 @@ contains
       call agree(error)
    end subroutine write_outcome
 
-   !> Finish the result of a complete run, which has no checkpoint any more.
+   !> Finish the result of a complete run, and then remove its checkpoint. A process that dies in between loses
+   !> nothing.
    subroutine finish(self, error)
       class(run_files_type), intent(inout) :: self
       type(error_type), allocatable, intent(inout) :: error
@@ -329,11 +330,13 @@ contains
          call self%result%write_number('processes', real(process_count(), dp))
          call self%result%write_number('exchanged_bytes', exchanged)
          call self%result%unlink_checkpoint(error)
-         if (.not. allocated(error)) call remove_checkpoint(self%path)
       end if
       call agree(error)
       call self%write_outcome('finished', error)
-      if (is_first_process()) call self%result%finish(.true., error)
+      if (is_first_process()) then
+         call self%result%finish(.true., error)
+         if (.not. allocated(error)) call remove_checkpoint(self%path)
+      end if
       call agree(error)
    end subroutine finish
 

@@ -21,11 +21,9 @@ module time_limit
       real(dp), private :: margin = 0.0_dp       !! s
       real(dp), private :: longest_step = 0.0_dp !! s
       real(dp), private :: longest_save = 0.0_dp !! s
-      real(dp), private :: before = 0.0_dp       !! when the present step began, s
    contains
       procedure :: start
-      procedure :: step_begins
-      procedure :: step_ends
+      procedure :: note
       procedure :: is_near
       procedure :: has_come
    end type time_limit_type
@@ -66,26 +64,15 @@ contains
       self%margin = min(30.0_dp, 0.05_dp*max(left, 0.0_dp))
    end subroutine start
 
-   !> Note that a step begins.
-   subroutine step_begins(self)
+   !> Note how long steps and checkpoints have taken.
+   subroutine note(self, longest_step, longest_save)
       class(time_limit_type), intent(inout) :: self
+      real(dp), intent(in) :: longest_step       !! so far, with its output, s
+      real(dp), intent(in) :: longest_save       !! so far, s
 
-      self%before = seconds_now()
-   end subroutine step_begins
-
-   !> Note that the step is done and written.
-   subroutine step_ends(self, saved)
-      class(time_limit_type), intent(inout) :: self
-      logical, intent(in) :: saved               !! with a checkpoint
-      real(dp) :: taken
-
-      taken = seconds_now() - self%before
-      if (saved) then
-         self%longest_save = max(self%longest_save, taken)
-      else
-         self%longest_step = max(self%longest_step, taken)
-      end if
-   end subroutine step_ends
+      self%longest_step = longest_step
+      self%longest_save = longest_save
+   end subroutine note
 
    !> Is there no time for another step and a checkpoint?
    function is_near(self) result(near)

@@ -124,13 +124,12 @@ def read_dma(
     """
     path = Path(path)
     poisson = poisson_ratio(poisson)
-    for word, value, allowed in (("frequency_unit", frequency_unit, FREQUENCY_UNITS),
-                                 ("modulus_unit", modulus_unit, MODULUS_UNITS),
-                                 ("temperature_unit", temperature_unit, TEMPERATURE_UNITS)):
+    for word, value, allowed in (("frequency_unit", frequency_unit, tuple(FREQUENCY_UNITS)),
+                                 ("modulus_unit", modulus_unit, tuple(MODULUS_UNITS)),
+                                 ("temperature_unit", temperature_unit, tuple(TEMPERATURE_UNITS)),
+                                 ("kind", kind, KINDS)):
         if value is not None:
-            choice(word, value, tuple(allowed))
-    if kind is not None:
-        choice("kind", kind, KINDS)
+            choice(word, value, allowed)
     asked = asked_columns(columns)
     lines = unfolded(cells_of(text_lines(path)), role_of)
     header, units, body = split_header(path, lines, asked)
@@ -160,38 +159,37 @@ def read_dma(
     if "loss" in places:
         own = modulus_unit is None and found_units.get("loss") is not None
         loss = values["loss"] * (unit("loss", None, MODULUS_UNITS, "Pa") if own else to_pascal)
-        if own_tan_delta is not None:
-            notes += _contradiction(body, own_tan_delta, percent * loss / storage)
+        notes += _contradiction(body, own_tan_delta, percent * loss / storage)
     else:
         loss = storage * values["tan_delta"] / percent
     factor, said = _to_shear(kind, poisson)
-    storage, loss = factor * storage, factor * loss
     notes += said
-    temperature = None
-    if "temperature" in places:
-        temperature = values["temperature"] + to_celsius
+    temperature = values["temperature"] + to_celsius if "temperature" in places else None
+    if temperature is None:
+        notes += _repeated(values["frequency"], storage)
+    else:
         has_unit = bool(temperature_unit or found_units.get("temperature"))
         notes += _check_temperatures(path, body, temperature, has_unit)
-    else:
-        notes += _repeated(values["frequency"], storage)
-    return DmaTable(to_omega * values["frequency"], storage, loss, temperature, path.name, notes)
+    return DmaTable(to_omega * values["frequency"], factor * storage, factor * loss, temperature,
+                    path.name, notes)
 
 
-def _contradiction(body: Rows, at: int, ratio: FloatArray) -> list[str]:
+def _contradiction(body: Rows, at: int | None, ratio: FloatArray) -> list[str]:
     """Return a note if the column of tan delta contradicts G''/G', which is used instead of it.
 
     Parameters
     ----------
     body : list of rows
         The rows of the table.
-    at : int
-        Index of the column of tan delta. Cells that are not a positive number are not compared.
+    at : int or None
+        Index of the column of tan delta, if there is one. Cells that are not a positive number are
+        not compared.
     ratio : ndarray, shape (n,)
         G''/G' of each row, in the unit of the column.
     """
     found = []
     for (line, cells), own in zip(body, ratio, strict=True):
-        text = cells[at] if at < len(cells) else ""
+        text = cells[at] if at is not None and at < len(cells) else ""
         if is_number(text) and float(text) > 0.0:
             found.append((abs(math.log(float(text) / own)), line, text, own))
     if not found or float(np.median([one[0] for one in found])) < math.log(_LARGEST_MISMATCH):
