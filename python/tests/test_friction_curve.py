@@ -387,8 +387,6 @@ def test_without_resume_all_runs_are_made_again(tmp_path):
     again = run_curve(plan, tmp_path, Means(1, resume=False), quiet=True)
     assert all(path.stat().st_mtime_ns > one for path, one in zip(results, before, strict=True))
     same(whole, again)
-    with pytest.raises(ValueError, match="not with slurm"):
-        run_curve(plan, tmp_path, Means(1, resume=False, slurm=""), quiet=True)
 
 
 def test_more_patches_do_not_repeat_runs_without_resume(tmp_path, capsys):

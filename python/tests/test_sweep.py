@@ -567,6 +567,21 @@ def test_a_stopped_case_continues_from_its_checkpoint(tmp_path, program):
     np.testing.assert_array_equal(run.history["seconds"][:done], seconds)
 
 
+def test_the_name_of_a_file_is_no_reason_to_begin_again():
+    """The program names the file in its messages."""
+    begins_again = asperity.runs.jobs.begins_again
+    assert not begins_again(3, "map=damaged.h5: cannot be written: No space left on device")
+    assert begins_again(3, "map=a.checkpoint.h5: the checkpoint is damaged: its checksum or its")
+    assert begins_again(2, "map=a.checkpoint.h5: is of another case")
+
+
+def test_lists_and_numbers_can_be_set_together(tmp_path):
+    material = {("material.prony_g", "material.prony_tau", "material.shear_modulus"): [
+        ([1e6, 2e6], [1e-3, 1e-2], 1e6), ([3e6], [1e-3], 2e6)]}
+    table = sweep(wave(), material, folder=tmp_path)
+    assert [run.material["prony_g"].tolist() for run in table.runs] == [[1e6, 2e6], [3e6]]
+
+
 def test_broken_results_are_run_again(tmp_path):
     parameters = {"phase.pressure": [1e3, 2e3, 3e3]}
     whole = sweep(wave(), parameters, folder=tmp_path)
@@ -619,9 +634,15 @@ def test_wrong_types_are_found_before_the_runs(tmp_path):
             (dict(executor=3), r"executor = 3: must be a concurrent\.futures\.Executor"),
             (dict(executor=ThreadPoolExecutor(1), slurm=""),
              "executor and slurm: give only one of them"),
-            (dict(slurm="", jobs=0), "jobs = 0: must be a positive integer")):
+            (dict(slurm="", jobs=0), "jobs = 0: must be a positive integer"),
+            (dict(slurm="", resume=False),
+             r"resume = False \(--no-resume\): not with slurm \(--slurm\): the same call must find"
+             " the results of the jobs")):
         with pytest.raises(ValueError, match=f"^{message}$"):
             asperity.sweep(case, {"phase.pressure": [1e3]}, folder=folder, quiet=True, **options)
+    with pytest.raises(ValueError, match=r"\]\]: must be 2 values, one for each name"):
+        asperity.sweep(case, {("material.prony_g", "material.prony_tau"): [([1.0, 2.0],)]},
+                       folder=folder, quiet=True)
     with pytest.raises(ValueError, match=r"^output\.file: the results of a sweep are named"):
         asperity.sweep(case, {"output.file": ["a.h5"]}, folder=folder, quiet=True)
     with pytest.raises(ValueError, match="named 'temperture': did you mean 'temperatures'"):

@@ -246,9 +246,6 @@ def run_curve(
         If runs fail, or were submitted to Slurm and are not complete.
     """
     plan = first_plan(plan, error, extend, most_patches)
-    if means.slurm is not None and not means.resume:
-        raise ValueError("resume = False (--no-resume): not with slurm (--slurm): the same call"
-                         " must find the results of the jobs")
     renewed: set[str] = set()  # with more patches, the runs of the first ones are not repeated
     while True:
         curve = gather(plan, run_pieces(plan, Path(folder), means, quiet, renewed), extend)

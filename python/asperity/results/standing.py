@@ -68,7 +68,9 @@ def held(run: ResultFile) -> bool | None:
     """Return whether a process holds the lock of a result; None if this cannot be determined.
 
     An attempt to take the lock could prevent a run from starting at that moment. Linux's list of
-    all locks is read instead.
+    all locks is read instead, as by `state_of_lock` of the program (file_lock.f90): a file is known
+    by its inode, because on some file systems the list has another number of the device than
+    `stat`.
     """
     path = Path(os.path.realpath(run.path))
     lock = _beside(path, ".lock")
@@ -76,10 +78,10 @@ def held(run: ResultFile) -> bool | None:
         words = lock.read_text(errors="replace").split()
         if words[3:5] != ["on", platform.node()]:  # asperity process NUMBER on HOST since ...
             return None
-        there = lock.stat()
-        wanted = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"
-        return any(wanted in line.split() and "FLOCK" in line.split()
-                   for line in Path("/proc/locks").read_text().splitlines())
+        inode = str(lock.stat().st_ino)
+        locks = (line.split() for line in Path("/proc/locks").read_text().splitlines())
+        return any("FLOCK" in words and any(word.split(":")[2:] == [inode] for word in words)
+                   for words in locks)
     except OSError:
         return None
 

@@ -35,9 +35,11 @@ _ECHO = 0.3             # two signals within this time, s, count as one (to us a
 _PATIENCE = 60.0        # time that a stopped process has for its checkpoint, s
 _PAUSE = 1.0            # before a case that another process is running is looked at again, s
 # Words of the program about a file from which it cannot continue, with status 3. Other causes of
-# this status, such as a full disk, leave the checkpoint as it is for the next call.
-UNSUITABLE = ("damaged", "is empty", "its end is missing", "no checkpoint", "nothing to continue",
-              "not an HDF5 file")
+# this status, such as a full disk, leave the checkpoint as it is for the next call. The words are
+# such that the name of a file, which the message contains, hardly has them.
+UNSUITABLE = (": is damaged", ": the file is damaged", ": the checkpoint is damaged", ": is empty:",
+              ": its end is missing: ", " has no checkpoint from which to continue",
+              ": there is nothing to continue", ": is not an HDF5 file")
 
 
 @dataclass
@@ -53,8 +55,13 @@ class Job:
     process: subprocess.Popen[bytes] | None = None
     output: IO[bytes] | None = None
     restarted: bool = False
-    started: float = 0.0
+    started: float | None = None                    # on the monotonic clock, s
     due: float = 0.0                                # when to look again at a case in use
+
+    @property
+    def seconds(self) -> float | None:
+        """Time since the start of the run, s; None if it was not started here."""
+        return None if self.started is None else time.monotonic() - self.started
 
 
 def is_done(job: Job) -> bool:
@@ -198,8 +205,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
     take_new_end = new_ends(waiting, resume)
 
     def count(job: Job) -> None:
-        progress.done(job.name, job.message if job.status else None,
-                      time.monotonic() - job.started, len(running))
+        progress.done(job.name, job.message if job.status else None, job.seconds, len(running))
 
     with Stops() as stops:
         try:
@@ -314,7 +320,7 @@ def _finish(job: Job) -> bool:
 
 def _is_used(job: Job) -> bool:
     """Return whether another process is writing the result of a case."""
-    return job.status == 3 and "is in use by" in job.message
+    return job.status == 3 and ": is in use by " in job.message
 
 
 def _stop(running: list[Job], stops: Stops) -> None:

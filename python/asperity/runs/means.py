@@ -100,7 +100,8 @@ def means_of(jobs: int | None, threads: int, resume: bool, executor: Executor | 
     ------
     ValueError
         If a number is not positive, there are fewer processors than `threads` for runs on this
-        machine, the executor is none, or both an executor and Slurm are given.
+        machine, the executor is none, both an executor and Slurm are given, or Slurm without
+        `resume`.
     """
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise ValueError(f"executor = {shown(executor)}: must be a concurrent.futures.Executor")
@@ -108,6 +109,9 @@ def means_of(jobs: int | None, threads: int, resume: bool, executor: Executor | 
         return Means(*share_of_processors(jobs, threads), resume)
     if executor is not None and slurm is not None:
         raise ValueError("executor and slurm: give only one of them")
+    if slurm is not None and not resume:
+        raise ValueError("resume = False (--no-resume): not with slurm (--slurm): the same call"
+                         " must find the results of the jobs")
     most = whole("jobs", jobs) if jobs is not None else None
     return Means(most, number_of_threads("threads", threads), resume, executor, slurm)
 
@@ -191,7 +195,7 @@ def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> No
                 while ready and len(running) < most:
                     job = ready.pop(0)
                     if take_new_end(job):
-                        progress.done(job.name, job.message if job.status else None, 0.0,
+                        progress.done(job.name, job.message if job.status else None, job.seconds,
                                       len(ready) + len(running))
                     else:
                         running[_submit_to_executor(job, means)] = job
@@ -201,7 +205,7 @@ def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> No
                     job = running.pop(future)
                     _take(job, future)
                     progress.done(job.name, job.message if job.status else None,
-                                  time.monotonic() - job.started, len(ready) + len(running))
+                                  job.seconds, len(ready) + len(running))
         finally:
             for future in running:
                 future.cancel()

@@ -120,7 +120,7 @@ def source(case: Any) -> tuple[str, str]:
 def table() -> dict[str, GroupEntry]:
     """Return the groups of the input by name."""
     groups: dict[str, GroupEntry] = {}
-    for line in _text_of(lambda buffer: (_groups(buffer),)).splitlines():
+    for line in text_from(lambda buffer: (_groups(buffer),)).splitlines():
         kind, *cells = line.split(_SEPARATOR)
         if kind == "group":
             name, required, repeatable, meaning = cells
@@ -154,7 +154,7 @@ def listed(text: str, path: str | os.PathLike[str] = "") -> list[tuple[str, dict
         If the text is wrong. The message lists all faults.
     """
     found: list[tuple[str, dict[str, Any]]] = []
-    listing = _text_of(functools.partial(_listed, encode(text), os.fsencode(path)), len(text))
+    listing = text_from(functools.partial(_listed, encode(text), os.fsencode(path)), len(text))
     for line in listing.split("\n")[:-1]:
         name, *items = line.split(_SEPARATOR)
         if name.startswith("&"):
@@ -191,7 +191,7 @@ def check_text(text: str, path: str | os.PathLike[str], files: bool) -> str:
     OSError
         If a height map cannot be read.
     """
-    return _text_of(functools.partial(_check, encode(text), os.fsencode(path), int(files)))
+    return text_from(functools.partial(_check, encode(text), os.fsencode(path), int(files)))
 
 
 def _value(kind: str, item: str) -> Any:
@@ -203,7 +203,7 @@ def _value(kind: str, item: str) -> Any:
     return item == "T" if kind == "logical" else item
 
 
-def _text_of(routine: Any, size: int = 0) -> str:
+def text_from(routine: Any, size: int = 0) -> str:
     """Return the text that a routine writes into a buffer, which is enlarged if necessary."""
     most = max(30000, 30 * size)
     while True:

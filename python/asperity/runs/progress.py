@@ -69,8 +69,8 @@ class Progress:
         seconds = (time.monotonic() - self._start) / self._done * left
         return f", about {duration(seconds)} left"
 
-    def done(self, name: str, fault: str | None, seconds: float, running: int) -> None:
-        """Count a case; `fault` is None unless it failed."""
+    def done(self, name: str, fault: str | None, seconds: float | None, running: int) -> None:
+        """Count a case. `fault` is None unless it failed; `seconds` if another process ran it."""
         self._done += 1
         self._failed += fault is not None
         if self._quiet:
@@ -79,7 +79,8 @@ class Progress:
             self._bar.show(self._kept + self._done, self._total,
                            f"{self._what}: {self._state()}{self._left()}")
         if fault is not None or not (self._terminal or self._bar):
-            how = f"done in {short_time(seconds)}" if fault is None else f"FAILED: {fault}"
+            by = "by another process" if seconds is None else f"in {short_time(seconds)}"
+            how = f"done {by}" if fault is None else f"FAILED: {fault}"
             self._line(f"{self._what}: {self._state()}{self._left()}: {name}: {how}")
         self.show(running)
 

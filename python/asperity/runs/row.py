@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..base import library
 from ..base.names import NamedValues
 from ..results.column_types import RowColumns
+from . import namelists
 
 __all__ = ["Column", "Field", "Row", "columns", "fields"]
 
@@ -39,10 +40,8 @@ class Field(NamedTuple):
 
 def _entries(write: Callable[[NDArray[np.intc]], int]) -> list[tuple[str, str, bool, str]]:
     """Return the lines of a table of the library: name, units, a truth, and the meaning."""
-    buffer = np.zeros(100000, dtype=np.intc)
-    length = int(write(buffer))
-    lines = bytes(buffer[:length].astype(np.uint8)).decode().splitlines()
-    parts = (line.split(" ", 3) for line in lines)
+    text = namelists.text_from(lambda buffer: (write(buffer),))
+    parts = (line.split(" ", 3) for line in text.splitlines())
     return [(name, units, truth == "1", long_name) for name, units, truth, long_name in parts]
 
 

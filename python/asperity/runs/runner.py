@@ -135,8 +135,10 @@ def run(
     try:
         failure = _do_rows(handle, (first, rows), notes, result, stops, quiet, callback)
     finally:
-        _close(handle)
-        stops.end()
+        try:
+            _close(handle)
+        finally:
+            stops.end()
     if failure is not None and not isinstance(failure, NotConverged):
         raise failure
     opened = Run(os.fsdecode(result.rstrip()))

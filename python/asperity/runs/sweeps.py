@@ -192,8 +192,10 @@ def _points(parameters: Mapping[str | tuple[str, ...], Sequence[Any]], parallel:
         axis = []
         for value in values:
             value = _plain(value)
-            if isinstance(key, tuple) and (np.ndim(value) == 0 or len(value) != len(names)):
-                raise ValueError(f"{key}: {value!r}: must be {len(names)} values, one a name")
+            if isinstance(key, tuple) and not (
+                    isinstance(value, list) and len(value) == len(names)):
+                raise ValueError(f"{key}: {value!r}: must be {len(names)} values, one for each"
+                                 " name")
             axis.append(dict(zip(names, value if isinstance(key, tuple) else [value],
                                  strict=True)))
         if not axis:
