@@ -275,8 +275,9 @@ contains
             '                    or all processors'//nl// &
             '  --restart         continue from the last checkpoint of the result'//nl// &
             '  --overwrite       replace the file of the result, and its checkpoint'//nl// &
-            '  --time-limit T    stop with a checkpoint before T has passed: M, H:M:S or D-H:M:S;'//nl// &
-            '                    the default is the end of the Slurm job, if there is one'//nl// &
+            '  --time-limit T    stop with a checkpoint before T has passed, which is written as for'//nl// &
+            '                    Slurm: M, M:S, H:M:S, D-H, D-H:M or D-H:M:S; the default is the end of'//nl// &
+            '                    the Slurm job, if there is one'//nl// &
             '  --quiet           show no progress'//nl//nl// &
             'SIGINT, SIGTERM, SIGHUP and SIGXCPU stop a run with a checkpoint after the current step;'//nl// &
             'after SIGUSR1 it writes a checkpoint and continues.'//nl//nl//statuses()

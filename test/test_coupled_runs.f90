@@ -97,7 +97,7 @@ contains
          call sim%advance(error)
          call check_no_error(error, what//': row')
          if (allocated(error)) exit
-         call check_that(sim%converged, what//': converged: '//trim(sim%reason))
+         call check_that(sim%converged, what//': converged: '//sim%reason)
          if (.not. sim%converged) exit
          values = reshape([values, row_values(sim%state%row)], [size(values, 1), rows + 1])
          rows = rows + 1

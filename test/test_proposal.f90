@@ -154,7 +154,7 @@ contains
          call check_that(same(formal%state, plain%state), what//': propose and accept')
       end do
       call check_that(plain%finished .and. hesitant%finished .and. formal%finished, what//': finished')
-      call check_that(plain%converged, what//': converged: '//trim(plain%reason))
+      call check_that(plain%converged, what//': converged: '//plain%reason)
       call check_that(hesitant%warnings == plain%warnings, what//': warnings')
       call plain%destroy()
       call hesitant%destroy()

@@ -242,7 +242,7 @@ contains
          ! JKR holds 1.5 pi gamma_0 R = 2.36e-5 N, DMT 3.14e-5 N
          call check_that(held >= 3 .and. held < 5 .or. m == 2 .and. held >= 2 .and. held < 5, &
             'the contact holds pulls up to one between JKR and DMT; rows held: '//to_text(held), [real(held, dp)])
-         call check_that(sim%reason == 'detached', 'the reason is detached, not '//trim(sim%reason))
+         call check_that(sim%reason == 'detached', 'the reason is detached, not '//sim%reason)
          call sim%destroy()
       end do
    end subroutine detachment_is_reported

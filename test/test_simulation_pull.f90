@@ -198,7 +198,7 @@ contains
       call sim%advance(error)
       call check_that(.not. sim%converged, 'beyond: not converged')
       call check_that(index(sim%reason, 'pulled by 40000 Pa') > 0 .and. &
-         index(sim%reason, 'holds at most 35000 Pa') > 0, 'beyond: the reason: '//trim(sim%reason))
+         index(sim%reason, 'holds at most 35000 Pa') > 0, 'beyond: the reason: '//sim%reason)
       call check_close(sim%state%row%traction_y/sim%state%row%traction_x, 4.0_dp/3.0_dp, 1e-6_dp, 'beyond: the direction')
       call sim%destroy()
    end subroutine pull_beyond_friction_is_reported

@@ -1,6 +1,6 @@
 """Where the public names of the package live, and the addresses by which users import them.
 
-Modules are grouped in rooms, such as ``asperity.roads.surface``, but users write the shorter
+Modules are grouped in subpackages, such as ``asperity.roads.surface``, but users write the shorter
 address ``asperity.surface``. Both names give the same module. Nothing is imported before it is
 used.
 """
@@ -83,13 +83,13 @@ PRESENTERS = {
 
 
 class _Loader(importlib.abc.Loader):
-    """Loads the module of a room under the address that users know."""
+    """Loads a module of a subpackage under its public name, `asperity.<module>`."""
 
     def __init__(self, place: str) -> None:
         self._place = place
 
     def create_module(self, spec: importlib.machinery.ModuleSpec) -> ModuleType:
-        """Return the module of the room; `exec_module` restores its own specification."""
+        """Return the module of the subpackage; `exec_module` restores its own specification."""
         module = importlib.import_module(self._place)
         self._own = module.__spec__
         return module
@@ -149,7 +149,7 @@ def find(package: str, name: str) -> Any:
     if name in MODULES:
         return importlib.import_module(f".{name}", package)
     try:
-        return importlib.import_module(f".{name}", package)  # a room, or `theory`
+        return importlib.import_module(f".{name}", package)  # a subpackage, or `theory`
     except ModuleNotFoundError as error:
         if error.name != f"{package}.{name}":
             raise

@@ -423,7 +423,7 @@ def test_ctrl_c_ends_without_a_traceback(tmp_path):
         if "1 of 4 done" in line:
             process.send_signal(signal.SIGINT)
     assert process.wait(PATIENCE) == 130
-    assert "asperity: stopped by Ctrl-C: the same command goes on with what is in" in said
+    assert "asperity: stopped by Ctrl-C: the same command continues from the results in" in said
     assert "Traceback" not in said
 
 

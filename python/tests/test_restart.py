@@ -18,7 +18,7 @@ import viscoelastic_case as vc
 from conftest import PATIENCE
 
 import asperity
-from asperity.results.standing import way_on
+from asperity.results.standing import how_to_continue
 
 
 @pytest.fixture(scope="module")
@@ -389,4 +389,4 @@ def test_the_checkpoint_of_any_name_is_found(tmp_path: Path, name: str) -> None:
     case = tmp_path / "case.nml"
     case.write_text(SHORT + f"&output file = '{name}' /")
     run = asperity.run(case, callback=lambda row, sim: row.step < 1)
-    assert way_on(run) == "--restart continues from the last checkpoint"
+    assert how_to_continue(run) == "--restart continues from the last checkpoint"

@@ -399,7 +399,7 @@ def test_scans_are_joined_within_their_ranges():
     assert ratio[0] == pytest.approx(1.0) and ratio[-1] == pytest.approx(1.21)
     assert np.abs(np.diff(np.log(ratio))).max() < 0.12  # the joined spectrum has no step
     apart = join_spectra([whole.cut(short=2 * np.pi / 1e3), whole.cut(long=2 * np.pi / 1e5)])
-    assert any("no scan tells of waves" in note for note in apart.notes)
+    assert any("no scan covers the waves" in note for note in apart.notes)
     np.testing.assert_allclose(apart.at(k), whole.at(k), rtol=1e-6)
 
 

@@ -134,7 +134,7 @@ def test_lock_shows_whether_a_run_continues(program: str, stuck: Path,
     assert "outcome     the run continues\n" in told()
     process.kill()
     process.communicate(timeout=PATIENCE)
-    assert "the process has ended: it was killed, or could not write" in told()
+    assert "The process has ended: it was killed, or it could not write" in told()
     assert asperity.open(result).state.endswith("its process has ended")
     lines = io.StringIO()
     watch(result, once=True, stream=lines)

@@ -367,8 +367,10 @@ contains
       call self%file%open(self%path, 'append')
       call self%read_text('id', self%id)
       call self%report(error)
-      if (.not. allocated(error) .and. self%id /= id) call fail(error, error_input, self%path// &
-         ': is not the result that '//checkpoint_path(path)//' belongs to')
+      if (.not. allocated(error)) then
+         if (self%id /= id) call fail(error, error_input, self%path//': is not the result that '// &
+            checkpoint_path(path)//' belongs to')
+      end if
       call go_back(self%file, last_step, self%grid, self%expected_rows, self%snapshots%written, error)
       call self%finish(.false., error)
       call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots%written, error)

@@ -84,7 +84,7 @@ contains
    subroutine check_replaced(path, error)
       character(*), intent(in) :: path
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
-      character(:), allocatable :: checkpoint, way_on
+      character(:), allocatable :: checkpoint, advice
 
       if (allocated(error)) return
       checkpoint = checkpoint_path(path)
@@ -100,9 +100,9 @@ contains
                'it, or choose another --output')
             return
          case (is_unfinished)
-            way_on = ': --restart continues it from its last checkpoint, --overwrite replaces it'
-            if (.not. file_exists(checkpoint)) way_on = ', and there is no checkpoint: --overwrite starts again'
-            call fail(error, error_file, path//': holds an unfinished run'//way_on//', or choose another --output')
+            advice = ': --restart continues it from its last checkpoint, --overwrite replaces it'
+            if (.not. file_exists(checkpoint)) advice = ', and there is no checkpoint: --overwrite starts again'
+            call fail(error, error_file, path//': holds an unfinished run'//advice//', or choose another --output')
             return
          end select
       end if

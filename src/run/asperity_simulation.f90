@@ -51,7 +51,7 @@ module asperity_simulation
    type, extends(contact_type) :: simulation_type
       logical :: converged = .true.                 !! the last row's solvers met the tolerance
       logical :: finished = .false.                 !! no row is left
-      character(320) :: reason = ''                 !! why not converged
+      character(:), allocatable :: reason           !! why not converged
       real(dp), private :: residual = 0.0_dp        !! the error that is too large, or the residual of the normal solver
       real(dp), private :: allowed = 0.0_dp         !! the largest that would have been accepted
       character(:), allocatable :: warnings         !! new ones, one per line; the caller clears them
@@ -86,6 +86,7 @@ contains
       self%grid = case%grid
       call self%grid%share_rows()
       self%warnings = ''
+      self%reason = ''
       allocate (self%state)
       self%slides = road_moves(case%phases)
       if (present(movable)) self%slides = self%slides .or. movable
@@ -99,18 +100,18 @@ contains
    end subroutine new_simulation
 
    !> Find the state after the next row, without changing the present one. If the solvers do not converge, the
-   !> state that they have reached is proposed.
+   !> state that they have reached is proposed. After an error nothing is proposed.
    subroutine propose(self, error)
       class(simulation_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
       type(state_type), allocatable :: present_state
 
-      allocate (present_state)
-      present_state = self%state
-      self%old_warnings = len(self%warnings)
+      if (allocated(self%proposed)) deallocate (self%proposed)
+      if (allocated(self%state)) allocate (present_state, source=self%state)
+      if (allocated(self%warnings)) self%old_warnings = len(self%warnings)
       call self%advance(error)
-      call move_alloc(self%state, self%proposed)
-      call move_alloc(present_state, self%state)
+      if (.not. allocated(error)) call move_alloc(self%state, self%proposed)
+      if (allocated(present_state)) call move_alloc(present_state, self%state)
    end subroutine propose
 
    !> Make the proposed state the present one.
@@ -338,7 +339,7 @@ contains
          call note_outcome(self, found%tangential)
          self%reason = 'friction: '//trim(found%tangential%reason)
          advice = advice_on_slopes(self)
-         if (len(advice) > 0) self%reason = trim(self%reason)//'. '//advice
+         if (len(advice) > 0) self%reason = self%reason//'. '//advice
          if (self%tangential%road_pull%slides_off) then
             self%reason = pull_outcome(plan, self%tangential)
             self%residual = found%tangential%load_error
@@ -355,7 +356,7 @@ contains
       type(simulation_type), intent(inout) :: self
       type(solver_result_type), intent(in) :: outcome
 
-      self%reason = outcome%reason
+      self%reason = trim(outcome%reason)
       self%allowed = merge(outcome%required, self%case%solver%tolerance, outcome%required > 0.0_dp)
       self%residual = outcome%residual
       if (outcome%residual <= self%allowed .and. outcome%load_error > self%allowed) self%residual = outcome%load_error
@@ -368,7 +369,7 @@ contains
       type(planned_row_type), intent(in) :: plan
 
       self%residual = 0.0_dp
-      self%reason = trim(self%reason)//'. It is '//to_text(plan%load)//' m and must be below '// &
+      self%reason = self%reason//'. It is '//to_text(plan%load)//' m and must be below '// &
          to_text(self%summit - field_mean(self%height))//' m, the mean gap at first touch: beyond it the pressure '// &
          'of a periodic contact is not determined'
    end subroutine note_full_contact
@@ -381,7 +382,7 @@ contains
 
       associate (row => self%state%row)
          text = 'step '//to_text(row%step)//' of phase '//to_text(row%phase)//', t = '//to_text(row%time)// &
-            ' s: the solver did not converge: '//trim(self%reason)
+            ' s: the solver did not converge: '//self%reason
       end associate
       if (.not. self%residual <= self%allowed) text = text//'; residual '//to_text(self%residual)//', allowed '// &
          to_text(self%allowed)

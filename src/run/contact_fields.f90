@@ -19,7 +19,7 @@ contains
       character(*), intent(in) :: name              !! as in /snapshots, except 'contact'
       integer, intent(in) :: first                  !! the first row
       real(dp), intent(out) :: values(:, :)         !! [nx, rows]
-      integer :: c, last
+      integer :: last
 
       last = first + size(values, 2) - 1
       select case (name)
@@ -39,14 +39,38 @@ contains
       case ('road_height')
          values = self%height(:, first:last)
       case default
-         values = 0.0_dp
-         if (.not. self%frictional) return
-         c = merge(1, 2, index(name, '_x') > 0)
-         if (index(name, 'traction') == 1) values = self%state%tangential%traction(:, c, first:last)
-         if (index(name, 'displacement') == 1) values = self%state%tangential%displacement(:, c, first:last)
-         if (index(name, 'slip') == 1) values = slip_rows(self, c, first, last)
+         call friction_rows(self, name, first, last, values)
       end select
    end subroutine field_rows
+
+   !> Some rows of a field of friction, which is zero without friction. A field of an unknown name is not a number.
+   subroutine friction_rows(self, name, first, last, values)
+      class(contact_type), intent(in) :: self
+      character(*), intent(in) :: name
+      integer, intent(in) :: first, last
+      real(dp), intent(out) :: values(:, :)
+
+      values = 0.0_dp
+      if (.not. self%frictional) return
+      associate (tangential => self%state%tangential)
+         select case (name)
+         case ('traction_x')
+            values = tangential%traction(:, 1, first:last)
+         case ('traction_y')
+            values = tangential%traction(:, 2, first:last)
+         case ('displacement_x')
+            values = tangential%displacement(:, 1, first:last)
+         case ('displacement_y')
+            values = tangential%displacement(:, 2, first:last)
+         case ('slip_x')
+            values = slip_rows(self, 1, first, last)
+         case ('slip_y')
+            values = slip_rows(self, 2, first, last)
+         case default
+            values = ieee_value(1.0_dp, ieee_quiet_nan)
+         end select
+      end associate
+   end subroutine friction_rows
 
    !> Some rows of the slip. It is not part of the state: it is not a number in a state that was saved or returned to,
    !> until the next row.

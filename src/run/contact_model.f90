@@ -137,7 +137,8 @@ contains
       if (self%frictional) yes = self%state%tangential%moved
    end function rubs
 
-   !> Is there friction, although the road has not moved yet? All touching cells then stick.
+   !> Is there a law of friction whose tractions are still zero, because the road has not moved? All touching cells then
+   !> stick.
    pure function holds(self) result(yes)
       class(contact_type), intent(in) :: self
       logical :: yes

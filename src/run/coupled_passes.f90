@@ -203,7 +203,7 @@ contains
       if (continues) call contact%tangential%expect(contact%state%tangential, self%place)
    end subroutine begin
 
-   !> Solve the step all at once, because the passes have stalled. If that succeeds, the next pass starts from its
+   !> Solve the step all at once, because the passes are slow or have stalled. If that succeeds, the next pass starts from its
    !> solution with accurate solves, and verifies that the step is solved. Otherwise the place stays as it is.
    subroutine solve_jointly(self, contact, plan, control, tangential, overwritten)
       class(coupled_passes_type), intent(inout) :: self

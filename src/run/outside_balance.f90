@@ -36,7 +36,7 @@ contains
       real(dp), intent(in) :: drive(2)               !! the same now, N
       real(dp), intent(in) :: inertia(2)             !! the part of it that accelerated the mass, mean over the step, N
       logical, intent(in) :: abrupt                  !! the step is a jump, whose path is not known
-      logical, intent(in) :: kinked                  !! the first step of a motion with friction
+      logical, intent(in) :: kinked                  !! the road with friction begins to move, also after a jump
       logical, intent(in) :: adhesive
       type(history_row_type), intent(inout) :: row
       real(dp) :: inside, excess, margin, motion(2), sunk, driven(2), work

@@ -17,8 +17,8 @@
 !>   fold: the contact will snap to another state). The residual then keeps its direction and hardly changes from
 !>   pass to pass, while each step leads a little further to the other state. The passes return to the best place
 !>   and continue without acceleration (`plain`), with a momentum that grows as long as the residual keeps its
-!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth (`recovered`) of its value at the
-!>   first plain step, or has not been halved in `stalled_plain` passes, the acceleration begins again from the present
+!>   direction and vanishes if it turns. When the mismatch has fallen to a tenth (`recovered`) of the least
+!>   one before the plain steps, or has not been halved in `stalled_plain` passes, the acceleration begins again from the present
 !>   place. The best place before is discarded, because it may belong to the state that ceased to exist.
 !>
 !> A step may also be solved all at once (`joint_due`), at most twice per row. The first attempt is made after a few

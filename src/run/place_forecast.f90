@@ -48,7 +48,7 @@ module place_forecast
 
 contains
 
-   !> Make a forecast that knows no differences yet.
+   !> Make a forecast without differences: it predicts no change.
    subroutine new_place_forecast(self, nx, rows)
       type(place_forecast_type), intent(out) :: self
       integer, intent(in) :: nx

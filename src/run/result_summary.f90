@@ -109,9 +109,12 @@ contains
 
       call file%dataset_shape(dataset, extent)
       call file%report(error)
-      if (.not. allocated(error) .and. size(extent) /= 2) call fail(error, error_file, path// &
-         ': '//dataset//': is no map: it has '//to_text(size(extent))//' dimensions')
       if (allocated(error)) return
+      if (size(extent) /= 2) then
+         call fail(error, error_file, path//': '//dataset//': is no map: it has '//to_text(size(extent))// &
+            ' dimensions')
+         return
+      end if
       allocate (height(extent(1), extent(2)), stat=status)
       if (status /= 0) then
          call fail(error, error_memory, path//': not enough memory to read the heights')
@@ -123,7 +126,8 @@ contains
       if (file%has_attribute('/grid', 'lx') .and. file%has_attribute('/grid', 'ly')) then
          call file%read_attribute('/grid', 'lx', lx)
          call file%read_attribute('/grid', 'ly', ly)
-         call file%read_attribute('/grid', 'boundary', boundary)
+         boundary = 'free'                            ! as `asperity import` takes a map that does not say it
+         if (file%has_attribute('/grid', 'boundary')) call file%read_attribute('/grid', 'boundary', boundary)
          text = text//', '//to_text(lx)//' m x '//to_text(ly)//' m, '//in_one_line(boundary, 40)
       end if
       text = text//nl//'heights     '//to_text(minval(height))//' m to '//to_text(maxval(height))// &
@@ -232,10 +236,11 @@ contains
       case (lock_held)
          text = 'the run continues'
       case (lock_free)
-         text = 'not recorded: the process has ended: it was killed, or could not write its result, as on a full disk'
+         text = 'not recorded. The process has ended: it was killed, or it could not write its result (for '// &
+            'example, because the disk was full)'
       case default
-         text = 'not recorded: the run continues, or was killed, or could not write its result, as on a full disk'// &
-            row_note(file)
+         text = 'not recorded. The run continues, or its process has ended: it was killed, or it could not write '// &
+            'its result (for example, because the disk was full)'//row_note(file)
       end select
    end function unrecorded_outcome
 
@@ -323,7 +328,7 @@ contains
          do i = 1, size(names)
             call file%read('/history/'//trim(names(i)), column, error)
             if (allocated(error)) then
-               if (.not. is_of_friction(names(i))) return
+               if (.not. may_be_absent(names(i))) return
                deallocate (error)                    ! not every file has them
                cycle
             end if
@@ -347,13 +352,13 @@ contains
 
       text = text//nl//'last row'//nl
       do i = 1, size(names)
-         if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is no friction
+         if (may_be_absent(names(i)) .and. largest(i) <= 0.0_dp) cycle      ! there is no friction
          text = text//'  '//named_value(names(i), last(i), units(i), area)//nl
       end do
 
       do i = 1, size(names)
          if (index(names(i), 'residual') == 0) cycle
-         if (is_of_friction(names(i)) .and. largest(i) <= 0.0_dp) cycle
+         if (may_be_absent(names(i)) .and. largest(i) <= 0.0_dp) cycle
          text = text//'largest '//trim(names(i))//' of all rows: '//to_text(largest(i))//nl
       end do
       call add_missing_work(file, text)
@@ -395,13 +400,13 @@ contains
          to_text(maxval(abs(missing(:rows)))/scale)//' of the work of load and drive (error of the steps)'//nl
    end subroutine add_missing_work
 
-   !> Does a column contain only zeros if there is no sliding?
-   pure function is_of_friction(name) result(of_friction)
+   !> May a result be without this column? The summary leaves the column out if it is zero.
+   pure function may_be_absent(name) result(may)
       character(*), intent(in) :: name
-      logical :: of_friction
+      logical :: may
 
-      of_friction = any(name == [character(20) :: 'stick_area', 'friction', 'residual_tangential', &
+      may = any(name == [character(20) :: 'stick_area', 'friction', 'residual_tangential', &
          'residual_coupling'])
-   end function is_of_friction
+   end function may_be_absent
 
 end module result_summary

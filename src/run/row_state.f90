@@ -2,7 +2,8 @@
 !>
 !> `state_type` is plain data: a copy of it is a saved state. `list_state` names each of its pieces, with
 !> units and meaning. The checkpoint and the restart go through that list. A new variable of the state is a
-!> component and one line of the list.
+!> component and one line of the list; a field is also named in module `row_stop`, which copies it with a check of the
+!> memory.
 !>
 !> Memory, in fields of doubles: P, gap and, if there are several rows, U; with Prony arms their state (S, S - S_old
 !> and one field per arm); with friction those of module `tangential_state`; with steady phases the last

@@ -20,6 +20,7 @@ module row_stop
    use field_copies, only : new_copy
    use row_state, only : state_type
    use stop_watch, only : begin_watch, end_watch, stop_question
+   use tangential_state, only : tangential_state_type
    implicit none
    private
 
@@ -73,26 +74,53 @@ contains
       end if
    end subroutine keep
 
-   !> Also copy the fields that the first part of a row with several parts will commit.
+   !> Also copy the fields that the first part of a row with several parts will commit. Without the memory for them, the
+   !> row can only be given up during this part.
    subroutine keep_more(self, state)
       class(row_stop_type), intent(inout) :: self
       type(state_type), intent(in) :: state
       real(dp) :: numbers
+      integer :: status
 
       if (.not. allocated(self%kept)) return
       numbers = numbers_of(state%arms) + numbers_of(state%tangential%arms)
+      if (allocated(state%displacement)) numbers = numbers + size(state%displacement)
       if (allocated(state%tangential%displacement)) numbers = numbers + 3.0_dp*size(state%tangential%displacement)
       ! The processes must agree: they have different numbers of rows.
       self%complete = 8.0_dp*global_max(numbers) <= most_more
       if (.not. self%complete) return
-      if (allocated(state%displacement)) self%kept%displacement = state%displacement
-      self%kept%arms = state%arms
-      self%kept%tangential%arms = state%tangential%arms
-      if (.not. allocated(state%tangential%displacement)) return
-      self%kept%tangential%displacement = state%tangential%displacement
-      self%kept%tangential%rubbing = state%tangential%rubbing
-      self%kept%tangential%force = state%tangential%force
+
+      status = 0
+      if (allocated(state%displacement)) call new_copy(state%displacement, self%kept%displacement, status)
+      if (status == 0) call copy_arms(state%arms, self%kept%arms, status)
+      if (status == 0) call copy_arms(state%tangential%arms, self%kept%tangential%arms, status)
+      if (status == 0 .and. allocated(state%tangential%displacement)) &
+         call copy_committed_friction(state%tangential, self%kept%tangential, status)
+      self%complete = .not. any_process(status /= 0)
    end subroutine keep_more
+
+   !> Copy the fields of arms. If there is not enough memory, `status` is not 0.
+   subroutine copy_arms(from, to, status)
+      type(arm_state_type), intent(in) :: from
+      type(arm_state_type), intent(inout) :: to
+      integer, intent(out) :: status
+
+      status = 0
+      if (allocated(from%s)) call new_copy(from%s, to%s, status)
+      if (status == 0 .and. allocated(from%ds)) call new_copy(from%ds, to%ds, status)
+      if (status == 0 .and. allocated(from%arm)) call new_copy(from%arm, to%arm, status)
+   end subroutine copy_arms
+
+   !> Copy the fields of friction that the end of a step changes. If there is not enough memory, `status` is not 0.
+   subroutine copy_committed_friction(from, to, status)
+      type(tangential_state_type), intent(in) :: from
+      type(tangential_state_type), intent(inout) :: to
+      integer, intent(out) :: status
+
+      call new_copy(from%displacement, to%displacement, status)
+      if (status == 0) call new_copy(from%rubbing, to%rubbing, status)
+      if (status == 0) call new_copy(from%force, to%force, status)
+   end subroutine copy_committed_friction
 
    !> The numbers that arms have on this process.
    pure function numbers_of(arms) result(numbers)

@@ -25,6 +25,7 @@ module run_files
    use simulation_state, only : load_state, save_state
    use snapshot_writer, only : write_height, write_snapshot
    use steady_losses, only : longest_wave
+   use step_watches, only : step_of_warning
    use text_tools, only : add_line, next_line, to_text
    implicit none
    private
@@ -218,7 +219,7 @@ contains
       character(:), allocatable, intent(in) :: saved   !! in the checkpoint; unallocated if it has none
       type(error_type), allocatable, intent(out) :: error
       character(:), allocatable :: left, line
-      integer :: at, step, status
+      integer :: at
 
       if (allocated(saved)) then
          self%warnings = saved
@@ -229,8 +230,7 @@ contains
       at = 1
       do while (at <= len(left))
          call next_line(left, at, line)
-         read (line(min(6, len(line)):max(5, index(line, ',') - 1)), *, iostat=status) step
-         if (status == 0 .and. step > sim%state%row%step) cycle
+         if (step_of_warning(line) > sim%state%row%step) cycle
          call add_line(self%warnings, line)
       end do
    end subroutine resume_warnings

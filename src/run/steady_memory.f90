@@ -126,7 +126,7 @@ contains
       end if
    end function arm_ratio
 
-   !> Set the stored energy, and the sums that the books keep from the last step.
+   !> Set the stored energy, and the sums that the books keep from the last step. Either `p` or `t` has an extent.
    subroutine set_books(medium, dt, p, t, books)
       type(medium_type), intent(in) :: medium
       real(dp), intent(in) :: dt
@@ -141,8 +141,11 @@ contains
       allocate (rows(2 + 2*arms, medium%grid%first_row - 1:medium%grid%last_row - 1))
       !$omp parallel do default(none) shared(medium, dt, p, t, rows) private(j)
       do j = medium%grid%first_row - 1, medium%grid%last_row - 1
-         if (size(p) > 0) call row_products(medium, dt, j, rows(:, j), p=p(:, j))
-         if (size(t) > 0) call row_products(medium, dt, j, rows(:, j), t=t(:, j, :))
+         if (size(p) > 0) then
+            call row_products(medium, dt, j, rows(:, j), p=p(:, j))
+         else
+            call row_products(medium, dt, j, rows(:, j), t=t(:, j, :))
+         end if
       end do
       total = row_totals(rows)
       ! The mean mode is in the first row.

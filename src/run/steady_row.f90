@@ -37,6 +37,8 @@ contains
       found%power_friction = steady%power_friction
       call set_road(contact, steady, plan)
       call copy_contact(contact, steady)
+      if (contact%frictional) &
+         call copy_tractions(contact%tangential, contact%state%tangential, steady%contact, contact%state%velocity)
       call set_arms(contact, steady, plan)
    end subroutine solve_steady_row
 
@@ -129,7 +131,6 @@ contains
       call steady%remember_normal(next_dt, contact%state%arms, contact%state%books)
       if (contact%frictional) then
          associate (tangential => contact%state%tangential)
-            call copy_tractions(contact%tangential, tangential, steady%contact, contact%state%velocity)
             call steady%remember_tangential(next_dt, tangential%arms, tangential%books)
          end associate
       end if

@@ -10,7 +10,9 @@ module step_watches
    implicit none
    private
 
-   public :: add_warning, watch_cells, watch_edge, watch_stick_slip
+   public :: add_warning, step_of_warning, watch_cells, watch_edge, watch_stick_slip
+
+   character(*), parameter :: mark = 'step '         !! with which a warning about a row begins
 
 contains
 
@@ -75,7 +77,20 @@ contains
       character(*), intent(in) :: message
 
       if (len(message) == 0) return
-      call add_line(warnings, 'step '//to_text(step)//', t = '//to_text(time)//' s: '//message)
+      call add_line(warnings, mark//to_text(step)//', t = '//to_text(time)//' s: '//message)
    end subroutine add_warning
+
+   !> The number of the row of a line that `add_warning` has made; -1 if the line is another one.
+   pure function step_of_warning(line) result(step)
+      character(*), intent(in) :: line
+      integer :: step
+      integer :: comma, status
+
+      step = -1
+      comma = index(line, ',')
+      if (index(line, mark) /= 1 .or. comma <= len(mark)) return
+      read (line(len(mark) + 1:comma - 1), *, iostat=status) step
+      if (status /= 0) step = -1
+   end function step_of_warning
 
 end module step_watches

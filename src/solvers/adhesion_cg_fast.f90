@@ -133,7 +133,7 @@ contains
       call begin_iteration(self, contact, now)
       call minimise(self, now, outcome)
       if (outcome%reason == reason_detached) then
-         ! A long step may have leapt over the barrier behind the minimum.
+         ! A long step may have passed the minimum and the barrier beyond it.
          call restore_start(self, contact, start)
          contact%level = level_before
          call begin_iteration(self, contact, now)
@@ -290,7 +290,7 @@ contains
       if (.not. changed .and. now%closings < most_closings) then
          call close_carried_gaps(self%work%patch, now, changed)
          if (changed) now%closings = now%closings + 1
-         ! A smaller residual tells more clearly whether a cell with a narrow gap is closed.
+         ! A smaller residual shows more reliably whether a cell with a narrow gap is closed.
          if (changed) now%limit = stricter*now%limit
       end if
       if (changed) call refresh(self, now)

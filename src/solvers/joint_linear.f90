@@ -1,4 +1,4 @@
-!> The linear system of a Newton's step for the joint equations (module `joint_system`), solved by GMRES.
+!> The linear system of a Newton step for the joint equations (module `joint_system`), solved by GMRES.
 !>
 !> The products with the derivative of the equations are finite differences. An approximate inverse (module
 !> `joint_system`) is applied before each product, so that GMRES measures the true residual. The gaps of open cells are not

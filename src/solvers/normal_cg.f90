@@ -194,7 +194,7 @@ contains
          call watch%judge(measure%error, drifted)
          if (drifted .and. now%phase == phase_conjugate) now%phase = phase_restart
          if (.not. watch%single) product => self%operator
-         if (outcome%iterations == problem%max_iterations) now%phase = phase_ended
+         if (outcome%iterations >= problem%max_iterations) now%phase = phase_ended
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
             call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction, self%step)

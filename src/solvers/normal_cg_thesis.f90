@@ -80,7 +80,7 @@ contains
          if (measure%error <= task%tolerance .and. determined) &
             call narrow_scale(task, height, pressure, self%operator%threads, measure)
          if (.not. determined .or. measure%strict <= task%tolerance) exit
-         if (outcome%iterations == task%max_iterations) exit
+         if (outcome%iterations >= task%max_iterations) exit
          outcome%stopped = stop_is_due()
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1

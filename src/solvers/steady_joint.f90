@@ -85,7 +85,7 @@ contains
       type(interpolation_type), intent(inout), target :: road
       type(steady_contact_type), intent(inout), target :: contact
       type(sliding_outcome_type), intent(inout) :: outcome
-      logical :: solved
+      logical :: begun, solved
 
       outcome%normal%converged = .false.
       outcome%tangential%converged = .false.
@@ -103,7 +103,8 @@ contains
          system%evaluations = 0
          system%most_evaluations = budget(self, operator%grid%cells())
          system%rules%law = law
-         call start(system, self%newton%now)
+         call start(system, self%newton%now, begun)
+         if (.not. begun) return
          ! A jump may need many steps, because cells change their state one after the other.
          self%newton%steps_to_halve = merge(near_steps, far_steps, self%attempt == from_here)
          if (law%jumps_at_edge()) self%newton%steps_to_halve = 0
@@ -161,30 +162,38 @@ contains
       if (system%slip_follows) system%near%slip = part*system%whole%slip
    end subroutine count_part
 
-   !> Set the units of the equations, and make the first state from the contact.
-   subroutine start(system, begun)
+   !> Set the units of the equations, and make the first state from the contact. `done` is .false. if there is not enough
+   !> memory.
+   subroutine start(system, first, done)
       type(steady_system_type), intent(inout) :: system
-      type(joint_state_type), intent(inout) :: begun
+      type(joint_state_type), intent(inout) :: first
+      logical, intent(out) :: done
 
       associate (contact => system%contact, rules => system%rules)
-         call find_responses(system)
+         call find_responses(system, done)
+         if (.not. done) return
          call system%begin(contact%pressure > 0.0_dp, contact%pressure, contact%gap, contact%traction, &
             rules%has_jump(contact%slope_x, contact%slope_y), &
-            sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2)), begun)
-         begun%level = contact%level
+            sqrt(field_mean(contact%slope_x**2 + contact%slope_y**2)), first)
+         first%level = contact%level
       end associate
    end subroutine start
 
-   !> Find the displacements around a cell under its unit pressure and its unit tractions: 14 transforms.
-   subroutine find_responses(system)
+   !> Find the displacements around a cell under its unit pressure and its unit tractions: 14 transforms. `done` is
+   !> .false. if there is not enough memory.
+   subroutine find_responses(system, done)
       type(steady_system_type), intent(inout) :: system
+      logical, intent(out) :: done
       real(dp), allocatable :: load(:, :), u(:, :), traction(:, :, :), shear(:, :, :), stretch(:, :, :)
-      integer :: c, k
+      integer :: c, k, status(2)
 
       associate (operator => system%operator, near => system%whole)
-         allocate (load(operator%nx, operator%rows), u(operator%nx, operator%rows), source=0.0_dp)
+         allocate (load(operator%nx, operator%rows), u(operator%nx, operator%rows), source=0.0_dp, stat=status(1))
          allocate (traction(operator%nx, 2, operator%rows), shear(operator%nx, 2, operator%rows), &
-            stretch(operator%nx, 2, operator%rows))
+            stretch(operator%nx, 2, operator%rows), stat=status(2))
+         done = .not. any_process(any(status /= 0))
+         if (.not. done) return
+
          if (operator%grid%first_row == 1 .and. operator%rows > 0) load(1, 1) = 1.0_dp
          call operator%displace(load, u)
          near%depth = near_values(operator%grid, u, neither)

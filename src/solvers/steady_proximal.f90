@@ -2,7 +2,7 @@
 !>
 !> Each step puts springs on the rubber, one on each cell, which are relaxed at the pressure P0 of the step before,
 !>
-!>     P >= 0,  K P + s (P - P0) - H - level >= 0,  one of both zero in each cell,  mean P = load
+!>     P >= 0,  K P + s (P - P0) - H - level >= 0,  and in each cell at least one of the two is zero,  mean P = load
 !>
 !> Since K is monotone, the steps converge to the solution without springs for any compliance s > 0 (R. T. Rockafellar,
 !> SIAM J. Control Optim. 14 (1976) 877), and the faster the smaller s is.
@@ -27,7 +27,8 @@ module steady_proximal
 
    public :: pays, solve_by_steps
 
-   ! Outcomes of a step: C has settled; its changes become fewer; they do not
+   ! Outcomes of a step. settled: C no longer changes. unsettled: fewer and fewer cells change. diverged: the number of
+   ! changes does not fall.
    integer, parameter :: settled = 1, unsettled = 2, diverged = 3
 
    integer, parameter :: first_trial = 128       !! iteration of the splitting from which the steps may pay
@@ -62,8 +63,8 @@ module steady_proximal
 
 contains
 
-   !> Would the splitting, at its pace so far, take long to come to the tolerance? Where it has taken very long, its pace
-   !> at the beginning says nothing.
+   !> Would the splitting, at its pace so far, take long to come to the tolerance? After very many iterations its
+   !> pace at the beginning is ignored.
    pure function pays(iteration, error, tolerance, dense) result(yes)
       integer, intent(in) :: iteration
       real(dp), intent(in) :: error              !! the least so far

@@ -1,1 +1,1 @@
-"""Tools of all rooms: checks of arguments, calls of the Fortran library, names, tables, errors."""
+"""What all subpackages use: checks, calls of the Fortran library, names, tables, errors."""

@@ -36,7 +36,7 @@ class _Output:
             self._drop()
 
     def _drop(self) -> None:
-        """Let everything go to nowhere from now on, also what is in the buffer."""
+        """Send everything to os.devnull from now on, also what is still in the buffer."""
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self._stream.fileno())
         os.close(nowhere)

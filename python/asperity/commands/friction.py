@@ -226,11 +226,11 @@ def _friction(chosen: argparse.Namespace) -> int:
         return 0
     except (KeyboardInterrupt, SystemExit) as stop:
         again = " without --no-resume" if chosen.no_resume else ""
-        way_on = f"the same command{again} goes on with what is in {folder}"
+        advice = f"the same command{again} continues from the results in {folder}"
         if isinstance(stop, KeyboardInterrupt):
-            raise KeyboardInterrupt(way_on) from None
+            raise KeyboardInterrupt(advice) from None
         with contextlib.suppress(OSError):  # nobody may read it any more
-            os.write(2, f"asperity: stopped by a signal: {way_on}\n".encode())
+            os.write(2, f"asperity: stopped by a signal: {advice}\n".encode())
         raise
     print(curve.summary(plan.all_notes))
     for output in outputs:

@@ -22,8 +22,8 @@ from ..base.names import counted
 if TYPE_CHECKING:
     from .result_file import ResultFile
 
-__all__ = ["held", "note_of", "rows_of", "seems_dead", "silence", "standing", "time_of_row",
-           "way_on"]
+__all__ = ["held", "how_to_continue", "note_of", "rows_of", "seems_dead", "silence", "standing",
+           "time_of_row"]
 
 LAST = 20  # number of last rows from which the time of the next one is estimated
 PATIENCE = 20.0  # factor on the longest of them before a run counts as killed
@@ -120,7 +120,7 @@ def standing(run: ResultFile) -> str:
     return "finished" if run.finished else f"not finished{', ' if note else ''}{note}"
 
 
-def way_on(run: ResultFile) -> str:
+def how_to_continue(run: ResultFile) -> str:
     """Return how a run that ended too early is continued. Without a checkpoint it cannot be."""
     if _beside(run.path, ".checkpoint.h5").exists():
         return "--restart continues from the last checkpoint"

@@ -384,7 +384,7 @@ def _advice(work: MapWork, level: str) -> list[str]:
         share = float(np.var(plane)) / variance
         if share > 0.1:
             notes.append(f"{100 * share:.0f} % of the variance of the heights is a tilt:"
-                         " level = 'tilt' (--level tilt) takes it off")
+                         " level = 'tilt' (--level tilt) removes it")
     if variance == 0.0:
         notes.append("the map is flat")
     lx, ly = work.sizes

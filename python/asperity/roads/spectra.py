@@ -317,7 +317,7 @@ def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectr
 
     Where bands overlap, the densities are averaged with weights that fade towards the ends of each
     band, so that no step remains. The mean of the logarithms would be too low, because the density
-    of each scan scatters: by 44 % where each has a single mode. Gaps are bridged by a power law,
+    of each scan scatters: by 44 % where each has a single mode. Gaps are filled by a power law,
     and noted.
 
     Parameters
@@ -364,8 +364,9 @@ def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectr
     reach = ordered[0].wavenumber[-1]
     for one in ordered[1:]:
         if one.wavenumber[0] > reach:
-            notes.append(f"no scan tells of waves from {2 * math.pi / reach:.3g} to"
-                         f" {2 * math.pi / one.wavenumber[0]:.3g} m: bridged by a power law")
+            notes.append(f"no scan covers the waves from {2 * math.pi / reach:.3g} to"
+                         f" {2 * math.pi / one.wavenumber[0]:.3g} m: the gap is filled by a"
+                         " power law")
         reach = max(reach, one.wavenumber[-1])
     notes.append(f"{len(spectra)} spectra joined, waves of {2 * math.pi / low:.3g} to"
                  f" {2 * math.pi / high:.3g} m")

@@ -130,7 +130,7 @@ class Sweep(OpenValues):
         Raises
         ------
         IndexError
-            If there are not so many cases.
+            If there are fewer cases than that.
         """
         return {name: column[index] for name, column in self._values.items()}
 

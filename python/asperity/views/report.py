@@ -18,7 +18,7 @@ from ..base.library import version
 from ..base.names import counted
 from ..results.derived import column_of, load_name
 from ..results.settings import has_friction, solver_setting
-from ..results.standing import held, rows_of, seems_dead, silence, time_of_row, way_on
+from ..results.standing import held, how_to_continue, rows_of, seems_dead, silence, time_of_row
 from ..results.steady import steady_mean, steady_rows
 from .page_parts import PAGE, colour_scales, fill_page, page_file, page_json
 from .report_charts import LOADS
@@ -142,7 +142,7 @@ def _notes(run: Run) -> str:
 
 def _unfinished(run: Run) -> str:
     """Return why a run is not finished, if the file contains that, and what to do."""
-    again = f"<code>asperity run CASE.nml</code>: {way_on(run)}."
+    again = f"<code>asperity run CASE.nml</code>: {how_to_continue(run)}."
     if run.outcome != "running":
         return f"Outcome: {escape(run.outcome)}; {again}"
     quiet = silence(run)

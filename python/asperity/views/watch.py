@@ -17,7 +17,7 @@ import numpy as np
 
 from ..base.durations import duration, short_time
 from ..results import Run
-from ..results.standing import held, rows_of, seems_dead, silence, time_of_row, way_on
+from ..results.standing import held, how_to_continue, rows_of, seems_dead, silence, time_of_row
 from ..results.steady import steady_rows
 from .style import si_scale
 
@@ -130,10 +130,10 @@ def state_of(run: Run, pace: Pace) -> str:
     if quiet >= 10.0:
         words.append(f"no new row for {duration(quiet)}")
     if held(run) is False:
-        words.append(f"its process has ended ({way_on(run)})")
+        words.append(f"its process has ended ({how_to_continue(run)})")
     elif seems_dead(run):
         words[-1] += (f" where a row takes up to {short_time(time_of_row(run) or 0.0)}: perhaps no"
-                     f" longer running ({way_on(run)})")
+                     f" longer running ({how_to_continue(run)})")
     return ", ".join(words)
 
 

@@ -1,4 +1,4 @@
-"""The rooms of the package import in one direction, and public module names stay the same."""
+"""The subpackages of the package import in one direction, and public module names stay the same."""
 
 import ast
 import importlib
@@ -12,7 +12,7 @@ from conftest import ROOT
 import asperity
 
 PACKAGE = ROOT / "python" / "asperity"
-# From the bottom up: a room may use those before it in the list.
+# From the bottom up: a subpackage may use those before it in the list.
 FLOORS = ("base", "roads", "rubber", "contact", "results", "theory", "views", "runs", "curves",
           "commands")
 ADDRESSES = ("adhesive_contact", "case", "contact", "dma", "errors", "export", "material",
@@ -81,20 +81,20 @@ def test_the_search_finds_a_circle():
 
 
 def test_no_circle_between_files():
-    # The package itself imports its rooms, but an import of the package does not make a circle.
+    # The package itself imports its subpackages, but an import of the package makes no circle.
     assert circle_in({name: others - {""} for name, others in GRAPH.items()}) == []
 
 
-@pytest.mark.parametrize("room", FLOORS)
-def test_rooms_use_only_rooms_below_them(room):
-    allowed = {*FLOORS[: FLOORS.index(room) + 1], ""}
+@pytest.mark.parametrize("subpackage", FLOORS)
+def test_subpackages_use_only_those_below_them(subpackage):
+    allowed = {*FLOORS[: FLOORS.index(subpackage) + 1], ""}
     for name, others in GRAPH.items():
-        if name.split(".")[0] == room:
+        if name.split(".")[0] == subpackage:
             above = {other for other in others if other.split(".")[0] not in allowed}
             assert not above, f"{name} imports {', '.join(sorted(above))}"
 
 
-def test_every_module_is_in_a_room():
+def test_every_module_is_in_a_subpackage():
     flat = {path.name for path in PACKAGE.glob("*.py")}
     assert flat == {"__init__.py", "__main__.py", "_addresses.py"}
     assert {name.split(".")[0] for name in MODULES} - {"", "__main__", "_addresses"} == set(FLOORS)
