@@ -59,7 +59,7 @@ contains
             dt = merge(2.0_dp, 1.0_dp, i > n/2)*4.0_dp/(1.5_dp*n)
             t = t + dt
             force = 2.0_dp*cos(t)
-            known = block%known([0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], dt)
+            known = block%known_force([0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], dt)
             ! f' = resistance x'/h - known
             advance = (force + known(1))/block%resistance(dt)
             call block%finish([advance, 0.0_dp], [force, 0.0_dp], dt)
@@ -80,7 +80,7 @@ contains
       block = block_motion_type(height=1.0_dp, mass=2.0_dp, area=3.0_dp, fresh=.false.)
       block%speed(1) = 1.0_dp
       do i = 1, 30
-         known = block%known([0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], 0.1_dp)
+         known = block%known_force([0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp], 0.1_dp)
          force = -known(1)
          call block%finish([0.0_dp, 0.0_dp], [force, 0.0_dp], 0.1_dp)
          call check_order(abs(block%speed(1)), '<=', 4.0_dp*i*0.5_dp**i, 'stuck: step '//to_text(i))

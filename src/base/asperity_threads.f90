@@ -8,6 +8,8 @@ module asperity_threads
 
    public :: processor_count, release_threads, set_threads, thread_count
 
+   integer, parameter, public :: least_parallel_cells = 16384   !! of a field; below, one thread is faster
+
 contains
 
    !> Use `n` threads from now on. With 0 the environment decides: OMP_NUM_THREADS, or else

@@ -11,7 +11,7 @@
 !> `cell_count` and the means of this module refer to the whole grid.
 module field_sums
    use asperity_parallel, only : gather_rows, global_max, global_min, global_sum, process_count
-   use asperity_threads, only : thread_count
+   use asperity_threads, only : least_parallel_cells, thread_count
    use asperity_precision, only : dp
    implicit none
    private
@@ -20,7 +20,6 @@ module field_sums
       field_product, field_rms, field_sum, largest_of_rows, least_of_rows, ratio_of_lengths, row_form, row_product, &
       row_total, row_totals, sum_rows, threads_for, vector_sum
 
-   integer, parameter :: small = 16384          !! cells below which one thread is faster
 
    !> Total of one sum or count per row: of `rows(j)`, or of `rows(k, j)` for a given k.
    interface row_total
@@ -192,7 +191,7 @@ contains
       integer :: threads
 
       threads = thread_count()
-      if (real(size(field, 1), dp)*size(field, 2) < small) threads = 1
+      if (real(size(field, 1), dp)*size(field, 2) < least_parallel_cells) threads = 1
    end function threads_for
 
    !> Sum of a field.
@@ -319,7 +318,7 @@ contains
 
       allocate (rows(size(condition, 2)))
       !$omp parallel do default(none) shared(condition, rows) private(j) &
-      !$omp num_threads(merge(1, thread_count(), size(condition) < small))
+      !$omp num_threads(merge(1, thread_count(), size(condition) < least_parallel_cells))
       do j = 1, size(condition, 2)
          rows(j) = count(condition(:, j))
       end do

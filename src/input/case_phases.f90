@@ -16,6 +16,8 @@ module case_phases
 
    public :: resolve_phases
 
+   real(dp), parameter, public :: most_cells_per_step = 1.5_dp  !! motion of the road up to which nothing is warned of
+
    real(dp), parameter :: most_steps = 1.0e9_dp
    real(dp), parameter :: most_rows = 2.0e9_dp                  !! of all phases: below 2^31
    character(*), parameter :: one_cell = 'for one cell per step'   !! reason for a time step
@@ -348,7 +350,7 @@ contains
 
       if (phase%static .or. grid%nx == 0) return
       cells = cells_per_step(phase, grid)
-      if (cells > 1.5_dp) call warn('a step moves the road by '//to_text(cells)// &
+      if (cells > most_cells_per_step) call warn('a step moves the road by '//to_text(cells)// &
          ' cells; to resolve the contact, move it by at most one cell per step, dt = '// &
          to_text(phase%dt/cells)//' s')
       tau = shortest_active(phase, material)

@@ -138,7 +138,7 @@ contains
       class(simulation_type), intent(inout) :: self
 
       call place_road(self, self%state%row%road_x, self%state%row%road_y)
-      if (self%rubs()) call find_heights(self)
+      if (self%friction_acts()) call find_heights(self)
       self%slip_known = .not. self%frictional
       self%finished = self%state%schedule%phase > size(self%case%phases)
    end subroutine resume
@@ -244,7 +244,7 @@ contains
       real(dp) :: pull(2)
 
       pull = 0.0_dp
-      if (self%case%friction%slope_effect .and. self%holds()) return
+      if (self%case%friction%slope_effect .and. self%all_cells_stick()) return
       pull = self%state%drive_force/self%grid%area()
    end function present_pull
 
@@ -309,7 +309,7 @@ contains
          if (self%frictional) call self%tangential%begin(state%tangential, self%material, motion, &
             plan%dt, plan%pulled, plan%pull)
          call move_road(self, plan)
-         if (self%rubs()) then
+         if (self%friction_acts()) then
             call self%passes%solve(self, plan, motion, found%normal, found%tangential)
             if (self%stop%given_up) return
             found%passes = self%passes%passes
@@ -320,7 +320,7 @@ contains
             if (self%stop%given_up) return
          end if
          if (self%frictional) then
-            call place_pulled_road(plan, state%schedule, self%tangential, self%rubs(), road, state%velocity)
+            call place_pulled_road(plan, state%schedule, self%tangential, self%friction_acts(), road, state%velocity)
             call watch_motion(plan, self%grid, road, state%motion_reported, message)
             call add_warning(self%warnings, state%schedule%row, plan%time, message)
          end if

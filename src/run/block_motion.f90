@@ -11,7 +11,7 @@
 !> the motion of the interface over the road (the top of the block moves by -(D' - D)). With gamma = 1/2
 !> - alpha and beta = (1 - alpha)^2/4 this is the rule of Wood, Bossak and Zienkiewicz (Int. J. Numer.
 !> Methods Eng. 15 (1980) 1562). It is of second order and stable for any step. Oscillations that are far faster
-!> than the steps decay by the factor `fastest` = (1 + alpha)/(1 - alpha) per step. With the trapezoidal rule
+!> than the steps decay by the factor `decay` = (1 + alpha)/(1 - alpha) per step. With the trapezoidal rule
 !> (alpha = 0) they would never decay once the block sticks.
 !>
 !> A state after an infinite time is one of rest: no inertia acts, and the kinetic energy is lost.
@@ -32,8 +32,8 @@ module block_motion
 
    public :: block_motion_type
 
-   real(dp), parameter :: fastest = 0.5_dp               !! decay factor, see above
-   real(dp), parameter :: alpha = (fastest - 1.0_dp)/(fastest + 1.0_dp)
+   real(dp), parameter :: decay = 0.5_dp                 !! decay factor, see above
+   real(dp), parameter :: alpha = (decay - 1.0_dp)/(decay + 1.0_dp)
    real(dp), parameter :: beta = (1.0_dp - alpha)**2/4.0_dp, gamma = 0.5_dp - alpha
 
    !> The state of the mean motion, and the inertia of the last step.
@@ -50,9 +50,9 @@ module block_motion
       real(dp) :: inertia(2) = 0.0_dp          !! mean force on the mass in the last step, N
    contains
       procedure :: has_inertia
-      procedure :: inert
+      procedure :: inertia_acts
       procedure :: resistance
-      procedure :: known
+      procedure :: known_force
       procedure :: respond
       procedure :: finish
       procedure :: come_to_rest
@@ -69,43 +69,43 @@ contains
    end function has_inertia
 
    !> Does the inertia of the block affect a step of length dt? There must be a mass, and dt must be positive.
-   pure function inert(self, dt) result(yes)
+   pure function inertia_acts(self, dt) result(yes)
       class(block_motion_type), intent(in) :: self
       real(dp), intent(in) :: dt               !! s
       logical :: yes
 
       yes = self%has_inertia() .and. dt > 0.0_dp
-   end function inert
+   end function inertia_acts
 
-   !> The contribution of the mass to the modulus Q of the mean: f' = resistance U'/h - known, Pa.
+   !> The contribution of the mass to the modulus Q of the mean: f' = resistance U'/h - known_force, Pa.
    pure function resistance(self, dt) result(modulus)
       class(block_motion_type), intent(in) :: self
       real(dp), intent(in) :: dt               !! s, > 0
       real(dp) :: modulus
 
-      modulus = self%height*self%mass*leading(self)/dt**2
+      modulus = self%height*self%mass*acceleration_factor(self)/dt**2
    end function resistance
 
    !> Factor c of f' = m c (x' - x)/dt^2 + (known part): (1 - alpha)/beta, or 2 for uniform acceleration.
-   pure function leading(self) result(factor)
+   pure function acceleration_factor(self) result(factor)
       class(block_motion_type), intent(in) :: self
       real(dp) :: factor
 
       factor = merge(2.0_dp, (1.0_dp - alpha)/beta, self%fresh)
-   end function leading
+   end function acceleration_factor
 
    !> The part of f' that is known before the step, Pa: see `resistance`.
-   pure function known(self, displacement, motion, dt) result(traction)
+   pure function known_force(self, displacement, motion, dt) result(traction)
       class(block_motion_type), intent(in) :: self
       real(dp), intent(in) :: displacement(2)  !! U, m
       real(dp), intent(in) :: motion(2)        !! D' - D, m
       real(dp), intent(in) :: dt               !! s, > 0
       real(dp) :: traction(2)
 
-      traction = self%mass*leading(self)*((displacement + motion)/dt**2 + self%speed/dt)
+      traction = self%mass*acceleration_factor(self)*((displacement + motion)/dt**2 + self%speed/dt)
       if (.not. self%fresh) traction = traction &
-         + self%mass*(leading(self)*(0.5_dp - beta) - alpha)*self%acceleration
-   end function known
+         + self%mass*(acceleration_factor(self)*(0.5_dp - beta) - alpha)*self%acceleration
+   end function known_force
 
    !> Describe how the mean displacement of the surface responds to the mean traction of a step: as that of a block
    !> without mass, whose height is `height` and which the road moves by `shift`/Q. A mass makes the block stiffer,
@@ -122,9 +122,9 @@ contains
 
       height = self%height
       shift = q*motion
-      if (self%inert(dt)) then
+      if (self%inertia_acts(dt)) then
          height = q*height/(q + self%resistance(dt))
-         shift = shift - height*self%known(displacement, motion, dt)
+         shift = shift - height*self%known_force(displacement, motion, dt)
       else if (self%has_inertia()) then
          height = 0.0_dp
          shift = shift - q*displacement
@@ -140,7 +140,7 @@ contains
       real(dp) :: before(2), after(2), speed(2), force(2), a(2)
 
       self%inertia = 0.0_dp
-      if (.not. self%inert(dt)) then
+      if (.not. self%inertia_acts(dt)) then
          self%fresh = .true.
          return
       end if

@@ -96,10 +96,10 @@ contains
       integer :: j, k
 
       touching = contact_slip
-      if (self%holds()) touching = contact_stick
+      if (self%all_cells_stick()) touching = contact_stick
       do k = 1, size(states, 2)
          j = first + k - 1
-         if (self%rubs()) then
+         if (self%friction_acts()) then
             states(:, k) = self%state%tangential%contact(:, j)
          else
             states(:, k) = merge(touching, contact_open, &

@@ -58,8 +58,8 @@ module contact_model
       logical :: frictional = .false.               !! there is a friction law, and the road moves
       logical :: slip_known = .true.                !! the slip is that of the last row
    contains
-      procedure :: rubs
-      procedure :: holds
+      procedure :: friction_acts
+      procedure :: all_cells_stick
    end type contact_type
 
 contains
@@ -129,22 +129,22 @@ contains
    end subroutine place_road
 
    !> Does friction act yet?
-   pure function rubs(self) result(yes)
+   pure function friction_acts(self) result(yes)
       class(contact_type), intent(in) :: self
       logical :: yes
 
       yes = .false.
       if (self%frictional) yes = self%state%tangential%moved
-   end function rubs
+   end function friction_acts
 
    !> Is there a law of friction whose tractions are still zero, because the road has not moved? All touching cells then
    !> stick.
-   pure function holds(self) result(yes)
+   pure function all_cells_stick(self) result(yes)
       class(contact_type), intent(in) :: self
       logical :: yes
 
-      yes = self%case%friction%law /= 'none' .and. .not. self%rubs()
-   end function holds
+      yes = self%case%friction%law /= 'none' .and. .not. self%friction_acts()
+   end function all_cells_stick
 
    !> Solve the normal contact under the row's load.
    subroutine solve_normal(self, plan, tolerance, outcome, displaced)

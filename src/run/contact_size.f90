@@ -68,7 +68,7 @@ contains
       start = 'patches of contact are only '
       if (present(beginning)) start = beginning
       if (patches%across >= patches%needed .or. .not. patches%across > 0.0_dp) return
-      if (nint(min(grid%cells(), 2.0_dp)) == 1) return
+      if (grid%cells() < 1.5_dp) return              ! a single cell
 
       consequence = 'the approach can be more than 1 % wrong, and area and pressures depend on the cells'
       if (.not. patches%needed > needed_by_many) &

@@ -21,6 +21,7 @@ module joint_step
 
    public :: joint_step_type
 
+   integer, parameter :: transforms_of_evaluation = 6
    integer, parameter :: impatient = 8                 !! steps of Newton's method that must halve the residual
 
    !> The equations and the method. A variable of this type must not be copied.
@@ -59,10 +60,10 @@ contains
       if (.not. has_memory) return
       self%newton%steps_to_halve = merge(0, impatient, thorough)
       call self%newton%solve(self%equations, contact%case%solver%tolerance, solved)
-      transforms = 6*self%equations%evaluations
+      transforms = transforms_of_evaluation*self%equations%evaluations
       if (thorough .and. .not. (solved .or. stop_is_due())) then
          call follow(self, contact, plan, place, solved)
-         transforms = transforms + 6*self%equations%evaluations
+         transforms = transforms + transforms_of_evaluation*self%equations%evaluations
       end if
       if (solved) call self%equations%return_solution(contact, self%newton%now, solved)
    end subroutine solve

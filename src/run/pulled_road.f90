@@ -5,6 +5,7 @@
 !> only within the tolerance, because heights are read at U_T - D, and this difference does not depend on it.
 module pulled_road
    use asperity_precision, only : dp
+   use case_phases, only : most_cells_per_step
    use regular_grid, only : grid_type
    use asperity_schedule, only : planned_row_type, schedule_type
    use tangential_step, only : tangential_step_type
@@ -74,14 +75,13 @@ contains
       real(dp), intent(in) :: road(2)               !! displacement of the road at the last row, m
       logical, intent(inout) :: reported            !! the warning has been given
       character(:), allocatable, intent(out) :: message
-      real(dp), parameter :: followed = 1.0_dp      !! cells per step
       real(dp) :: cells
 
       message = ''
       if (reported .or. .not. any(plan%pulled)) return
       cells = abs(plan%road(1) - road(1))/grid%dx
       if (grid%ny > 1) cells = max(cells, abs(plan%road(2) - road(2))/grid%dy)
-      if (cells <= followed) return
+      if (cells <= most_cells_per_step) return
       reported = .true.
       message = 'the pull moves the road by '//to_text(cells)//' cells in a step; the contact is well '// &
          'followed up to one cell per step: '

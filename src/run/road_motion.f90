@@ -27,7 +27,7 @@ contains
       call drive_direction(plan, self%state%direction)
       if (.not. self%slides) return
       drift = 0.0_dp
-      if (self%rubs()) then
+      if (self%friction_acts()) then
          self%tangential%way_before = norm2(self%state%velocity)*self%state%tangential%last_dt
          ! The surface is expected to move as in the step before or, if the road has just started, with the road.
          drift = self%state%tangential%rate*plan%dt
@@ -44,7 +44,7 @@ contains
          self%state%moved_cells = cells
       end if
       ! With friction the passes read the road at the displaced surface.
-      if (.not. self%rubs()) call place_road(self, plan%road(1), plan%road(2))
+      if (.not. self%friction_acts()) call place_road(self, plan%road(1), plan%road(2))
    end subroutine move_road
 
    !> Shift the fields that move with the road by whole cells.
@@ -58,7 +58,7 @@ contains
       call shift_field(self%grid, cells, self%state%pressure, moved)
       if (self%normal%adhesive .and. self%grid%boundary == boundary_periodic) &
          call shift_field(self%grid, cells, self%state%gap, moved)
-      if (self%rubs()) then
+      if (self%friction_acts()) then
          do c = 1, 2
             call shift_field(self%grid, cells, self%state%tangential%traction(:, c, :), moved)
             call shift_field(self%grid, cells, self%state%tangential%before(:, c, :), moved)

@@ -61,9 +61,9 @@ contains
       real(dp), intent(in) :: displacement(2)         !! mean of U at the start of the step, m
       real(dp), intent(in) :: dt                      !! s; 0: instantaneous
 
-      if (block%inert(dt)) then
+      if (block%inertia_acts(dt)) then
          self%mass_compliance = self%q*block%height/block%resistance(dt)
-         self%mass_offset = -self%mass_compliance*block%known(displacement, [0.0_dp, 0.0_dp], dt)
+         self%mass_offset = -self%mass_compliance*block%known_force(displacement, [0.0_dp, 0.0_dp], dt)
       else
          self%mass_compliance = tiny(1.0_dp)
          self%mass_offset = -self%q*displacement

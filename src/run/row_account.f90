@@ -54,10 +54,10 @@ contains
       kinked = .false.
       if (contact%frictional) then
          inertia = contact%state%tangential%block%inertia
-         kinked = contact%rubs() .and. (plan%new_speed .or. contact%tangential%starts)
+         kinked = contact%friction_acts() .and. (plan%new_speed .or. contact%tangential%starts)
          call fill_friction(contact, plan, sums%outside, force, row)
       end if
-      if (contact%holds()) row%stick_area = row%contact_area
+      if (contact%all_cells_stick()) row%stick_area = row%contact_area
       call fill_powers(contact, plan, row)
       if (plan%steady) call fill_steady(contact, found, row, force)
       row%friction = 0.0_dp

@@ -44,7 +44,7 @@ module adhesion_cg_fast
    use adhesion_residual, only : measure
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : control_pressure, reason_closed, reason_converged, reason_detached, reason_limit, &
+   use adhesion_state, only : control_pressure, reason_undetermined, reason_converged, reason_detached, reason_iterations, &
       reason_stalled, resolved_traction
    use adhesion_steps, only : choose_step, form_step_row, known_of_step, step_sums_type
    use adhesion_window, only : new_adhesion_window
@@ -124,7 +124,7 @@ contains
       real(dp) :: level_before, transforms_before
 
       if (self%work%patch%is_full_contact(contact%problem, contact%height)) then
-         outcome%reason = reason_closed
+         outcome%reason = reason_undetermined
          return
       end if
       transforms_before = transforms(self)
@@ -208,7 +208,7 @@ contains
       self%work%direction = 0.0_dp
       self%work%residual = 0.0_dp
       now%limit = now%problem%tolerance
-      outcome%reason = reason_limit
+      outcome%reason = reason_iterations
       do
          call choose_scaling(self, now)
          call measure(self%work, now)
@@ -223,7 +223,7 @@ contains
          end if
          if (is_detached(self%work%patch, now, now%least)) outcome%reason = reason_detached
          if (now%failures > most_failures) outcome%reason = reason_stalled
-         if (outcome%reason /= reason_limit .or. outcome%iterations >= now%problem%max_iterations) exit
+         if (outcome%reason /= reason_iterations .or. outcome%iterations >= now%problem%max_iterations) exit
          outcome%stopped = stop_is_due()
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1

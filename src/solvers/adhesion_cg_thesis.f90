@@ -17,7 +17,7 @@ module adhesion_cg_thesis
    use adhesion_potential, only : adhesive_energy, adhesive_terms
    use adhesion_start, only : begin_contact
    use adhesion_symbols, only : adhesion_symbols_type
-   use adhesion_state, only : control_approach, reason_closed, reason_converged, reason_detached, reason_limit, &
+   use adhesion_state, only : control_approach, reason_undetermined, reason_converged, reason_detached, reason_iterations, &
       reason_stalled
    use adhesion_steps, only : stepped_gap, sum_shift
    use asperity_errors, only : error_input, error_type, fail
@@ -77,7 +77,7 @@ contains
       integer(int64) :: before
 
       if (self%patch%is_full_contact(contact%problem, contact%height)) then
-         outcome%reason = reason_closed
+         outcome%reason = reason_undetermined
          return
       end if
       before = self%patch%transforms()
@@ -108,13 +108,13 @@ contains
       self%product = 0.0_dp
       curvature = 0.0_dp                                       ! d.(Q B + e'') d; 0: the next direction is r alone
       failures = 0
-      outcome%reason = reason_limit
+      outcome%reason = reason_iterations
       do
          call measure(self, now, outcome%residual, least)
          if (is_detached(self%patch, now, least)) outcome%reason = reason_detached
          if (failures > most_failures) outcome%reason = reason_stalled
          if (outcome%residual <= now%problem%tolerance) outcome%reason = reason_converged
-         if (outcome%reason /= reason_limit .or. outcome%iterations >= now%problem%max_iterations) exit
+         if (outcome%reason /= reason_iterations .or. outcome%iterations >= now%problem%max_iterations) exit
          outcome%stopped = stop_is_due()
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1

@@ -55,7 +55,7 @@ contains
       type(adhesion_iteration_type), intent(inout) :: now
       type(adhesion_iteration_type) :: inner
       real(dp) :: largest
-      integer :: j, k, most
+      integer :: j, k, most, shorter
 
       inner = now
       inner%state => work%model_state
@@ -71,10 +71,11 @@ contains
       inner%length_limited = .false.
       inner%pending = 0.0_dp
       inner%correction_pending = .false.
-      most = max(1, most_iterations/4**min(now%caution, 10))
-      largest = largest_change/4**min(now%caution, 10)
+      shorter = 4**min(now%caution, 10)
+      most = max(1, most_iterations/shorter)
+      largest = largest_change/shorter
       ! If steps were small, a jump of the attraction would stop every cell that arrives at it.
-      if (.not. has_smooth_potential(now%problem%potential)) largest = change_at_jump/4**min(now%caution, 10)
+      if (.not. has_smooth_potential(now%problem%potential)) largest = change_at_jump/shorter
       if (now%failures > 0) call close_narrow_gaps(work, inner)
       do k = 1, most
          if (k > 1 .or. abs(inner%pending) > 0.0_dp) call measure(work, inner)

@@ -14,18 +14,15 @@ module adhesion_state
    use contact_rule, only : is_closed
    use normal_state, only : control_approach, control_pressure
    use asperity_precision, only : dp
+   use solver_result, only : reason_converged, reason_iterations, reason_undetermined
    implicit none
    private
 
-   public :: adhesion_problem_type, close_gaps, control_approach, control_pressure, resolved_traction, &
-      traction_scale
+   public :: adhesion_problem_type, close_gaps, control_approach, control_pressure, reason_converged, reason_iterations, &
+      reason_undetermined, resolved_traction, traction_scale
 
-   character(*), parameter, public :: reason_converged = 'converged'
    character(*), parameter, public :: reason_detached = 'detached'
-   character(*), parameter, public :: reason_limit = 'the limit of iterations was reached'
    character(*), parameter, public :: reason_stalled = 'the energy can be lowered no further'
-   character(*), parameter, public :: reason_closed = &
-      'full contact: the displacement leaves no gap'
 
    !> An adhesive contact problem without its fields.
    type :: adhesion_problem_type

@@ -17,7 +17,7 @@
 !> Memory: two fields in single precision per component for each pair, and two fields of doubles per component.
 !> Single precision is sufficient for the pairs, because the residual itself is never computed from them.
 module anderson
-   use asperity_threads, only : thread_count
+   use asperity_threads, only : least_parallel_cells, thread_count
    use field_sums, only : row_totals
    use asperity_precision, only : dp, sp
    implicit none
@@ -61,7 +61,7 @@ contains
       self%components = components
       self%rows = rows
       self%pairs = pairs
-      self%threads = merge(1, thread_count(), nx*rows < 16384)
+      self%threads = merge(1, thread_count(), nx*rows < least_parallel_cells)
       allocate (self%gram(pairs, pairs), source=0.0_dp)
       allocate (self%df(nx, components, rows, pairs), self%dg(nx, components, rows, pairs))
       allocate (self%last_f(nx, components, rows), self%last_g(nx, components, rows))

@@ -59,7 +59,7 @@ module friction_cg
    use, intrinsic :: iso_fortran_env, only : int64
    use omp_lib, only : omp_get_wtime
    use regular_grid, only : boundary_periodic, grid_type
-   use solver_result, only : reason_shape, reason_unmade, solver_result_type
+   use solver_result, only : reason_converged, reason_iterations, reason_shape, reason_unmade, solver_result_type
    implicit none
    private
 
@@ -67,6 +67,8 @@ module friction_cg
 
    integer, parameter :: most_moves = 60         !! largest number of moves of the springs
    integer, parameter :: idle_moves = 3          !! moves in full slip with little gain after which the pull is too large
+   real(dp), parameter :: least_gain = 0.01_dp   !! part of the missing pull that a move must supply
+   real(dp), parameter :: most_longer = 10.0_dp  !! factor by which the next move may be longer
    !> If the mean compliance divided by the length of the map exceeds this, the fast method treats the mean mode
    !> separately. Below this value, that would cost iterations; above it, it saves them.
    real(dp), parameter :: thick = 0.2_dp
@@ -301,7 +303,7 @@ contains
       if (problem%cells == 0) then
          text = 'no contact'
       else if (result%converged) then
-         text = 'converged'
+         text = reason_converged
       else if (self%pull%slides_off) then
          text = 'the pull is more than the friction'
       else if (.not. ieee_is_finite(problem%residual)) then
@@ -309,7 +311,7 @@ contains
       else if (problem%residual <= result%required .and. result%load_error > result%required) then
          text = 'the total of the traction does not reach the pull'
       else if (result%iterations >= self%max_iterations) then
-         text = 'the limit of iterations was reached'
+         text = reason_iterations
       else
          text = 'no direction of descent'
       end if
@@ -362,13 +364,13 @@ contains
          if (self%method%stopped) exit
          after = self%pull%missing_total(problem)
          gained = dot_product(before, before - after)/max(dot_product(before, before), tiny(1.0_dp))
-         idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < 0.01_dp .and. leaves)
+         idle = merge(idle + 1, 0, problem%slipping == problem%cells .and. gained < least_gain .and. leaves)
          if (idle >= idle_moves) exit
          if (factor > 1.0_dp .and. (reach > 0.0_dp .or. gained > 1.0_dp)) then
             reach = 0.5_dp*factor*norm2(plain)
          else
             reach = 0.0_dp
-            factor = max(1.0_dp, min(10.0_dp*factor, factor/max(gained, 0.01_dp)))
+            factor = max(1.0_dp, min(most_longer*factor, factor/max(gained, least_gain)))
          end if
       end do
 

@@ -78,7 +78,8 @@ contains
          problem%spring%compliance(c) = softer*problem%compliance/sqrt(touching)
          self%rest(c) = -self%mean_mode(c)*(problem%spring%pull(c) + past_total(problem, c))
          problem%spring%end(c) = self%rest(c) + self%offset(c)
-         if (self%mass_compliance(c) > 0.0_dp) call hang_mass(self, problem%spring, c, self%mass_compliance(c)/cells)
+         if (self%mass_compliance(c) > 0.0_dp) &
+            call replace_spring_by_mass(self, problem%spring, c, self%mass_compliance(c)/cells)
          problem%mean_compliance(c) = merge(problem%spring%compliance(c), 0.0_dp, &
             problem%spring%compliance(c)*cells > soft)
       end do
@@ -88,9 +89,9 @@ contains
          problem%compliance/sqrt(touching)*norm2(problem%spring%pull))
    end subroutine attach
 
-   !> Let a mass take the place of a spring. In steps much longer than the period of the block the mass is softer than the
+   !> Replace a spring by a mass. In steps much longer than the period of the block the mass is softer than the
    !> spring; the spring then stays, and its end is moved until the offset of the road is that of the mass.
-   pure subroutine hang_mass(self, spring, c, compliance)
+   pure subroutine replace_spring_by_mass(self, spring, c, compliance)
       type(friction_pull_type), intent(inout) :: self
       type(road_spring_type), intent(inout) :: spring
       integer, intent(in) :: c                   !! direction
@@ -103,7 +104,7 @@ contains
       else
          spring%compliance(c) = compliance
       end if
-   end subroutine hang_mass
+   end subroutine replace_spring_by_mass
 
    !> Restore the mean mode of the operator, and add the displacement of this mode to the offset of the road.
    subroutine detach(self, problem, operator)

@@ -19,13 +19,13 @@
 module friction_rows
    use asperity_precision, only : dp
    use field_sums, only : row_totals, sum_rows
+   use friction_law, only : unbounded
    implicit none
    private
 
    public :: measure_sums_type, measured_row, move_sums_type, move_type, returned_row, stepped_row, &
       tangent_row, total_of
 
-   real(dp), parameter :: unbounded = huge(1.0_dp)
 
 
    !> Sums of `returned_row`.

@@ -18,7 +18,8 @@
 !>
 !> An iteration measures the error, chooses a direction d, releases the cells in which P + alpha d is negative, projects
 !> P + alpha d on the admissible pressures, which gives a step s, and adds the multiple of s to P that minimises the
-!> energy. Module `normal_iteration` chooses the direction and the step.
+!> energy, or the whole s where it was clipped and this lowers the energy, too. Module `normal_iteration` chooses the
+!> direction and the step.
 !>
 !> On a large grid, a solve without a given start, or with one for another load, first solves the same problem roughly on
 !> about a quarter of the cells along each side, whose means of the height are a smoother road, and starts from that

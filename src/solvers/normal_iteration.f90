@@ -49,6 +49,9 @@ module normal_iteration
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to reduce the energy
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
+   ! The energy falls along a step up to twice the multiple that minimises it. From this multiple on a clipped step is
+   ! taken whole: the pressure is then the projected one, in which the cells that leave the contact have exactly none.
+   real(dp), parameter :: least_for_whole = 0.55_dp
 
    ! Steps by which the preconditioner extends the residual before and after the release of cells, for the numbers of cells
    ! of a grid from which they save time.
@@ -69,7 +72,8 @@ module normal_iteration
 
    !> The numbers that an iteration passes to the next one.
    type :: iteration_type
-      integer :: phase = phase_restart
+      integer :: phase = phase_restart      !! how the next direction is formed
+      logical :: preconditioned = .false.   !! the present direction is not a plain one
       logical :: releases = .false.         !! the cells with a negative trial pressure are released
       logical :: free_mean = .false.        !! the load is not given, and a uniform pressure strains nothing
       integer :: class = 0                  !! place in the lists of steps
@@ -139,16 +143,17 @@ contains
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, before, rz, now%rz)
       now%rz = rz
       now%slope = 0.0_dp
-      if (now%phase /= phase_plain) then
-         now%phase = phase_conjugate
+      now%preconditioned = now%phase /= phase_plain
+      if (now%preconditioned) then
          call new_direction(work, fixed_load, .true., beta, pressure, now%slope)
          if (now%slope <= 0.0_dp .and. beta > 0.0_dp) &
             call new_direction(work, fixed_load, .true., 0.0_dp, pressure, now%slope)
       end if
       if (now%slope <= 0.0_dp) then
-         now%phase = phase_restart
+         now%preconditioned = .false.
          call new_direction(work, fixed_load, .false., 0.0_dp, pressure, now%slope)
       end if
+      now%phase = merge(phase_conjugate, phase_restart, now%preconditioned)
       if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
    end subroutine choose_direction
 
@@ -201,7 +206,7 @@ contains
          call shorten(now)
          return
       end if
-      if (work%preconditioner%by_waves .and. now%phase == phase_conjugate) &
+      if (work%preconditioner%by_waves .and. now%preconditioned) &
          call keep_block_sums(work, step, trial)
       call find_clip(work, fixed_load, task%target*work%grid%cells(), step, trial, clip)
       if (work%preconditioner%released) work%offset = work%offset + clip%shift/alpha
@@ -226,7 +231,7 @@ contains
    pure logical function is_releasing(now)
       type(iteration_type), intent(in) :: now
 
-      is_releasing = now%phase == phase_conjugate .and. now%releases
+      is_releasing = now%preconditioned .and. now%releases
    end function is_releasing
 
    !> The multiple alpha of the direction for the trial pressure.
@@ -296,7 +301,7 @@ contains
          now%kappa = max(before, now%kappa)
          call shorten(now)
       end if
-      if (clipped .and. now%alpha > 0.55_dp) then
+      if (clipped .and. now%alpha > least_for_whole) then
          now%alpha = 1.0_dp
       else if (now%alpha > 1.0_dp) then
          now%alpha = min(now%alpha, longest_multiple(work, pressure, step))

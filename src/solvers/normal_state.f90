@@ -5,18 +5,15 @@ module normal_state
    use asperity_precision, only : dp, pi
    use normal_sums, only : state_sums_type, total
    use projection, only : project_simplex
-   use solver_result, only : reason_shape, reason_unmade, solver_result_type
+   use solver_result, only : reason_converged, reason_iterations, reason_shape, reason_undetermined, reason_unmade, &
+      solver_result_type
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
 
    public :: combine_measures, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, return_solution, &
-      measure_gap, narrow_scale, normal_problem_type, prepare_problem, remove_round_off, row_measure
-
-   character(*), parameter, public :: reason_converged = 'converged'
-   character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
-   character(*), parameter, public :: reason_undetermined = &
-      'full contact: the displacement leaves no gap'
+      measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, reason_iterations, &
+      reason_undetermined, remove_round_off, row_measure
 
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed

@@ -11,6 +11,7 @@
 module schur_blocks
    use asperity_errors, only : error_type
    use asperity_precision, only : dp
+   use asperity_threads, only : least_parallel_cells
    use coarse_level, only : coarse_level_type
    use regular_grid, only : grid_type
    use schur_coarse, only : new_schur_coarse, om, schur_coarse_type
@@ -19,7 +20,6 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
-   integer, parameter :: small = 16384         !! blocks below which one thread is faster
 
    !> The numbers per block. A variable of this type must not be copied.
    type :: schur_blocks_type
@@ -48,15 +48,14 @@ module schur_blocks
 contains
 
    !> Make the numbers for the coarse level of a grid. Collective if processes share the rows.
-   subroutine new_schur_blocks(self, grid, coarse, c0, threads, error)
+   subroutine new_schur_blocks(self, grid, coarse, threads, error)
       type(schur_blocks_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
-      real(dp), intent(in) :: c0                         !! of the stencil
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
 
-      self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < small)
+      self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < least_parallel_cells)
       self%cells = grid%cells()
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
          allocate (self%pending(nx, first:last), self%correction(nx, first:last), source=0.0_dp)
@@ -64,7 +63,7 @@ contains
          allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
          allocate (self%search_off(nx, first:last), source=0.0_dp)
       end associate
-      call new_schur_coarse(self%model, grid, c0, coarse%h, coarse%nx, coarse%sharing, threads, error)
+      call new_schur_coarse(self%model, grid, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
 
    !> Make the mean of v over the grid stiff; 0 leaves the model as it is. In the units of the model.

@@ -22,6 +22,7 @@ module schur_coarse
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use asperity_parallel, only : global_sum
    use asperity_precision, only : dp, pi, sp
+   use asperity_threads, only : least_parallel_cells
    use regular_grid, only : grid_type
    use row_column_single, only : new_row_column, row_column_type
    use row_sharing, only : row_sharing_type
@@ -31,6 +32,7 @@ module schur_coarse
 
    public :: new_schur_coarse, schur_coarse_type
 
+   real(dp), parameter, public :: stencil_c0 = 0.7_dp
    real(dp), parameter, public :: stencil_c1 = 1.80063_dp   !! for cells of unit size
    real(dp), parameter, public :: om = 0.2_dp  !! constant part of W
    real(dp), parameter :: band = pi/16.0_dp    !! wave number per cell below which the coarse level acts
@@ -63,10 +65,9 @@ module schur_coarse
 contains
 
    !> Make the coarse part for a grid of blocks. Collective where processes share the rows.
-   subroutine new_schur_coarse(self, grid, c0, h, blocks_x, sharing, threads, error)
+   subroutine new_schur_coarse(self, grid, h, blocks_x, sharing, threads, error)
       type(schur_coarse_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: c0                       !! of the stencil
       real(dp), intent(in) :: h                        !! side of a square cell of the same area, m
       integer, intent(in) :: blocks_x                  !! blocks along x
       type(row_sharing_type), intent(in) :: sharing    !! of the rows of blocks
@@ -82,23 +83,22 @@ contains
       self%cells = grid%cells()/self%blocks
       most = (grid%nx/shape%nx + 1)*(grid%ny/shape%ny + 1)
       allocate (self%powers(0:most), source=[((k/self%cells)**power, k=0, most)])
-      self%threads = merge(1, threads, self%blocks < 16384.0_dp)
+      self%threads = merge(1, threads, self%blocks < least_parallel_cells)
       allocate (self%weight(shape%nx, shape%rows()), source=0.0_dp)
       call new_symbol_operator(self%missing, shape, error, single=.true.)
       if (.not. allocated(error)) call new_row_column(self%transform, shape, self%threads, error)
       if (allocated(error)) return
       modes = self%missing%modes()
       allocate (symbol(modes(1):modes(2), 0:shape%ny/2), self%model(modes(1):modes(2), 0:shape%ny/2))
-      call model_symbols(grid, c0, h, modes(1), symbol, self%model)
+      call model_symbols(grid, h, modes(1), symbol, self%model)
       call self%missing%set_symbol(symbol)
       own = self%transform%own_columns()
       allocate (self%symbol(own(1):own(2), 0:shape%ny/2, 1), source=0.0_sp)
    end subroutine new_schur_coarse
 
    !> Compute the part of B that the coarse level adds to the stencil, and the sum of both, at its wave vectors.
-   pure subroutine model_symbols(grid, c0, h, first, missing, model)
+   pure subroutine model_symbols(grid, h, first, missing, model)
       type(grid_type), intent(in) :: grid
-      real(dp), intent(in) :: c0
       real(dp), intent(in) :: h                        !! side of a cell, m
       integer, intent(in) :: first                     !! wave number along x of the first column
       real(dp), intent(out) :: missing(first:, 0:), model(first:, 0:)
@@ -125,7 +125,7 @@ contains
          real(dp), intent(in) :: kx, ky
          real(dp) :: value
 
-         value = c0 + stencil_c1*(4.0_dp - 2.0_dp*cos(kx) - 2.0_dp*cos(ky))
+         value = stencil_c0 + stencil_c1*(4.0_dp - 2.0_dp*cos(kx) - 2.0_dp*cos(ky))
       end function stencil
 
    end subroutine model_symbols

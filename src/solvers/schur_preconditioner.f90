@@ -40,7 +40,7 @@ module schur_preconditioner
    use regular_grid, only : grid_type
    use row_halo, only : new_rim_halo
    use schur_blocks, only : new_schur_blocks
-   use schur_coarse, only : om, stencil_c1
+   use schur_coarse, only : om, stencil_c0, stencil_c1
    use schur_passes, only : residual_pass, schur_fields_type, search_pass, step_type
    use schur_release, only : release_pass, trial_type
    use schur_sweeps, only : response_sums_type
@@ -50,7 +50,6 @@ module schur_preconditioner
 
    public :: new_schur_preconditioner, schur_preconditioner_type
 
-   real(dp), parameter :: c0 = 0.7_dp          !! constant of the stencil (module `schur_coarse`)
    real(dp), parameter :: typical = 3.2_dp     !! model over wave number per cell, between its least and its largest value
    real(dp), parameter :: solved = 1e-8_dp     !! reduction of the residual on N that is enough
 
@@ -92,13 +91,13 @@ contains
       self%compliance = typical*pi*coarse%kernel%compliance(pi/coarse%h)
       wx = merge(0.0_dp, stencil_c1*coarse%h/grid%dx, grid%nx == 1)
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
-      self%weights = real([c0 + 2.0_dp*(wx + wy), wx, wy], sp)
+      self%weights = real([stencil_c0 + 2.0_dp*(wx + wy), wx, wy], sp)
       allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
       allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
       call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
       self%image => pair(:, :, 1)
       self%response => pair(:, :, 2)
-      call new_schur_blocks(self%blocks, grid, coarse, c0, threads, error)
+      call new_schur_blocks(self%blocks, grid, coarse, threads, error)
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
 

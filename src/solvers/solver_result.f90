@@ -6,6 +6,11 @@ module solver_result
 
    public :: solver_result_type
 
+   ! Reasons for which a solve ends.
+   character(*), parameter, public :: reason_converged = 'converged'
+   character(*), parameter, public :: reason_iterations = 'the limit of iterations was reached'
+   character(*), parameter, public :: reason_undetermined = 'full contact: the displacement leaves no gap'
+
    ! Reasons for which a solve does not begin.
    character(*), parameter, public :: reason_unmade = 'the solver was not made, or making it has failed'
    character(*), parameter, public :: reason_shape = 'a field is missing or does not have the shape of the grid'

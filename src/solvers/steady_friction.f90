@@ -43,6 +43,7 @@ module steady_friction
    use steady_measure, only : steady_measure_type
    use steady_normal, only : new_steady_normal, steady_normal_type
    use steady_operator, only : steady_operator_type
+   use steady_scale, only : is_time_to_rescale
    use steady_start, only : contact_without_friction, ratio_of_sliding
    use steady_pace, only : along_path, along_second_path, components, from_here, new_pace, no_attempt, pace_type
    implicit none
@@ -354,7 +355,7 @@ contains
          self%state = self%state + self%residual
          call pace%note_plain(change)
       end if
-      if (.not. any(rounds == [8, 16, 32, 64])) return
+      if (.not. is_time_to_rescale(rounds)) return
       self%normal%z(:, :) = self%state(:, 1, :)
       call self%normal%rescale(self%operator, self%task, measure%scale, changed)
       if (.not. changed) return

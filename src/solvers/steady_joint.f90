@@ -185,12 +185,14 @@ contains
       type(steady_system_type), intent(inout) :: system
       logical, intent(out) :: done
       real(dp), allocatable :: load(:, :), u(:, :), traction(:, :, :), shear(:, :, :), stretch(:, :, :)
-      integer :: c, k, status(2)
+      integer :: c, k, status(5)
 
       associate (operator => system%operator, near => system%whole)
-         allocate (load(operator%nx, operator%rows), u(operator%nx, operator%rows), source=0.0_dp, stat=status(1))
-         allocate (traction(operator%nx, 2, operator%rows), shear(operator%nx, 2, operator%rows), &
-            stretch(operator%nx, 2, operator%rows), stat=status(2))
+         allocate (load(operator%nx, operator%rows), source=0.0_dp, stat=status(1))
+         allocate (u(operator%nx, operator%rows), source=0.0_dp, stat=status(2))
+         allocate (traction(operator%nx, 2, operator%rows), stat=status(3))
+         allocate (shear(operator%nx, 2, operator%rows), stat=status(4))
+         allocate (stretch(operator%nx, 2, operator%rows), stat=status(5))
          done = .not. any_process(any(status /= 0))
          if (.not. done) return
 

@@ -34,7 +34,7 @@ module steady_normal
    use steady_proximal, only : pays, solve_by_steps
    use steady_measure, only : measure_evaluation, steady_measure_type
    use steady_operator, only : steady_operator_type
-   use steady_scale, only : bounded_scale, fitting_scale, misfit
+   use steady_scale, only : bounded_scale, fitting_scale, is_time_to_rescale, largest_misfit, misfit
    implicit none
    private
 
@@ -44,6 +44,8 @@ module steady_normal
    integer, parameter :: first_trial = 16        !! iteration at which finishing on few cells is first tried
    integer, parameter :: soon = 1000             !! transforms after which a dense system counts as one that will soon be cheap
    real(dp), parameter :: cautious = 2.0_dp      !! factor of growth of the residual after which a step is plain
+   real(dp), parameter :: forgetting = 1.02_dp   !! by which the residual that later ones are compared to grows per step
+   real(dp), parameter :: clearly_less = 0.7_dp  !! part of the least error so far below which a pressure is kept
 
    !> The progress of a solve.
    type :: progress_type
@@ -160,7 +162,7 @@ contains
          end if
          progress%checks = progress%checks + 1
       end if
-      if (progress%measure%error < 0.7_dp*progress%least) then
+      if (progress%measure%error < clearly_less*progress%least) then
          progress%least = progress%measure%error
          self%best(:, :) = self%pressure
       end if
@@ -213,14 +215,14 @@ contains
       integer, intent(in) :: iteration
       type(progress_type), intent(inout) :: progress
 
-      if (any(iteration == [8, 16, 32, 64]) .and. misfit(progress%measure%scale, self%c) > 1.5_dp) then
+      if (is_time_to_rescale(iteration) .and. misfit(progress%measure%scale, self%c) > largest_misfit) then
          self%z = self%z + self%residual
          call self%take_scale(operator, task, progress%measure%scale)
          progress%reference = huge(1.0_dp)
       else
          call self%memory%step([1.0_dp], self%residual, self%z, &
             plain=progress%measure%change > cautious*progress%reference)
-         progress%reference = min(progress%measure%change, 1.02_dp*progress%reference)
+         progress%reference = min(progress%measure%change, forgetting*progress%reference)
       end if
    end subroutine advance
 
@@ -309,7 +311,7 @@ contains
       real(dp), intent(in) :: scale
       logical, intent(out) :: changed
 
-      changed = misfit(scale, self%c) > 1.5_dp
+      changed = misfit(scale, self%c) > largest_misfit
       if (changed) call self%take_scale(operator, task, scale)
    end subroutine rescale
 

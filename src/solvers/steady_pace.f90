@@ -107,7 +107,7 @@ contains
       real(dp), intent(in) :: change             !! of the last round
       real(dp), intent(in) :: tolerance          !! of the change
       real(dp), intent(in) :: cells              !! of the grid
-      real(dp) :: decades_left, decades_per_round, least, least_before, transforms
+      real(dp) :: decades_left, decades_per_round, least, least_before
 
       self%recent = [self%recent(2:), change]
       self%attempt = no_attempt
@@ -124,12 +124,19 @@ contains
       if (least > self%near .or. least < almost*tolerance .or. change > 2.0_dp*least) return
       decades_per_round = log10(least_before/least)/compared
       decades_left = log10(least/tolerance)
-      transforms = 6.0_dp + 2.0_dp*self%inner
-      self%expected = decades_left*transforms/max(decades_per_round, least_progress)
+      self%expected = decades_left*transforms_of_round(self)/max(decades_per_round, least_progress)
       if (self%expected <= price*sqrt(cells/priced_cells)) return
       self%attempt = from_here
       self%next_attempt = rounds + max(patience, rounds/2)
    end subroutine choose_attempt
+
+   !> The transforms of a round.
+   pure function transforms_of_round(self) result(transforms)
+      class(pace_type), intent(in) :: self
+      real(dp) :: transforms
+
+      transforms = 6.0_dp + 2.0_dp*self%inner
+   end function transforms_of_round
 
    !> Attempt to solve all cells at once sooner if the second half of the first rounds has made hardly any progress.
    subroutine check_progress(self, rounds, change, tolerance, cells)
@@ -146,7 +153,7 @@ contains
          self%least_so_far = huge(1.0_dp)
       else if (rounds == first_if_stalled) then
          decades_per_round = 2.0_dp*log10(self%least_before/self%least_so_far)/first_if_stalled
-         expected = log10(self%least_so_far/tolerance)*(6.0_dp + 2.0_dp*self%inner)/max(decades_per_round, least_progress)
+         expected = log10(self%least_so_far/tolerance)*transforms_of_round(self)/max(decades_per_round, least_progress)
          if (expected > price_far*sqrt(cells/priced_cells)) self%first_far = min(self%first_far, first_if_stalled)
       end if
    end subroutine check_progress

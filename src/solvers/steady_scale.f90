@@ -10,7 +10,10 @@ module steady_scale
    implicit none
    private
 
-   public :: bounded_scale, fitting_scale, misfit
+   public :: bounded_scale, fitting_scale, is_time_to_rescale, misfit
+
+   integer, parameter :: rescaling_iterations(4) = [8, 16, 32, 64]
+   real(dp), parameter, public :: largest_misfit = 1.5_dp   !! up to which a change of c would not pay
 
 contains
 
@@ -29,6 +32,13 @@ contains
       if (open_gap > 0.0_dp .and. touching > 0.0_dp) &
          scale = 2.0_dp*(field_sum(max(pressure, 0.0_dp))/touching)/open_gap
    end function fitting_scale
+
+   !> May c change in this iteration? Each change spoils the acceleration, so that it is only considered a few times.
+   pure logical function is_time_to_rescale(iteration)
+      integer, intent(in) :: iteration
+
+      is_time_to_rescale = any(iteration == rescaling_iterations)
+   end function is_time_to_rescale
 
    !> Limit c to the range of the compliances.
    pure function bounded_scale(operator, c) result(limited)

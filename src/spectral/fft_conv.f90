@@ -19,7 +19,7 @@ module fft_conv
    use asperity_errors, only : error_input, error_type, fail
    use computed_symbol, only : computed_symbol_type
    use kernels, only : kernel_type
-   use asperity_threads, only : thread_count
+   use asperity_threads, only : least_parallel_cells, thread_count
    use asperity_precision, only : dp, int64, power_of_two
    use regular_grid, only : boundary_periodic, grid_type
    use row_column_double, only : new_row_column_double => new_row_column, &
@@ -39,7 +39,6 @@ module fft_conv
    integer, parameter, public :: columns_inverse = 2   !! the same with 1/symbol (0 where it is 0)
    integer, parameter, public :: columns_form = 3      !! only the quadratic form
 
-   integer, parameter :: small = 16384                 !! cells below which one thread is faster
 
    !> A convolution operator with its plans and its work space. A variable of this type must not be copied.
    type :: convolution_type
@@ -194,7 +193,7 @@ contains
       self%mx = shape%mx
       self%my = shape%my
       self%components = shape%components
-      self%threads = merge(1, thread_count(), real(shape%nx, dp)*shape%ny < small)
+      self%threads = merge(1, thread_count(), real(shape%nx, dp)*shape%ny < least_parallel_cells)
       if (present(single)) self%single = single
       if (self%single) then
          call new_row_column_single(self%low, shape, self%threads, error, memory)

@@ -12,7 +12,7 @@
 !> symbols take one field, and six more with friction; the resolvent one.
 module steady_operator
    use asperity_errors, only : error_type
-   use asperity_threads, only : thread_count
+   use asperity_threads, only : least_parallel_cells, thread_count
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    use row_column_double, only : multiplier_type, new_row_column, row_column_type
@@ -23,7 +23,6 @@ module steady_operator
 
    public :: new_steady_operator, steady_operator_type
 
-   integer, parameter :: small = 16384                 !! cells below which one thread is faster
 
    !> One complex symbol.
    type, extends(multiplier_type) :: scalar_type
@@ -85,7 +84,7 @@ contains
       self%ny = grid%ny
       self%rows = grid%rows()
       self%frictional = frictional
-      self%threads = merge(1, thread_count(), grid%cells() < small)
+      self%threads = merge(1, thread_count(), grid%cells() < least_parallel_cells)
       call new_row_column(self%scalar, shape_on_grid(grid, 1), self%threads, error)
       if (allocated(error)) return
       columns = self%scalar%own_columns()
