@@ -281,7 +281,7 @@ def test_random_rows_against_dense_matrices(program: str, laws: tuple[str, ...])
 
 @pytest.mark.parametrize(("law", "message"), [
     ("law = 'coulomb', coefficient = 3., slope_effect = .false.",
-     "no solution was found; a larger max_iterations seldom helps, a lower coefficient or a"
+     "no solution was found; a larger max_iterations seldom helps, a lower load or coefficient or a"
      " smoother road may"),
     ("law = 'constant_shear', shear_strength = 5e5",
      "no solution was found, although one exists: law = 'coulomb_orowan' with coefficient = 0.5"

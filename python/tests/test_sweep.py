@@ -486,7 +486,7 @@ def test_a_result_that_cannot_be_read_is_made_anew(tmp_path):
 def test_cases_that_another_sweep_completes_are_not_run_again(tmp_path, monkeypatch, by_executor):
     """While the first of three cases is counted, another sweep completes all of them."""
     parameters = {"phase[1].pressure": [1e3, 2e3, 3e3]}
-    done = progress.Progress.done
+    done = progress.SweepProgress.done
     made = {}
 
     def count(self, *arguments):
@@ -496,7 +496,7 @@ def test_cases_that_another_sweep_completes_are_not_run_again(tmp_path, monkeypa
                 made[path] = (path.stat().st_ino, path.stat().st_mtime_ns)
         done(self, *arguments)
 
-    monkeypatch.setattr(progress.Progress, "done", count)
+    monkeypatch.setattr(progress.SweepProgress, "done", count)
     with ThreadPoolExecutor(1) as executor:
         table = sweep(sliding(), parameters, folder=tmp_path, jobs=1,
                       executor=executor if by_executor else None)

@@ -16,8 +16,8 @@ import asperity
 from asperity.__main__ import main
 from asperity.dma import DmaTable, fit_dma
 from asperity.material import Prony
-from asperity.runs.progress import Progress as ManyProgress
-from asperity.runs.run_progress import Progress
+from asperity.runs.progress import SweepProgress
+from asperity.runs.run_progress import RunProgress
 from asperity.views.style import PRINT, print_style
 
 
@@ -98,7 +98,7 @@ def test_progress_is_throttled(monkeypatch):
     now = [0.0]
     monkeypatch.setattr("asperity.runs.run_progress.clock.monotonic", lambda: now[0])
     stream = io.StringIO()
-    progress = Progress(1000, stream)
+    progress = RunProgress(1000, stream)
     for step in range(1000):
         now[0] += 0.01
         progress.show(step, 1e-3 * step, 0.1, 0.5)
@@ -119,12 +119,12 @@ def test_progress_in_a_notebook_is_a_bar(monkeypatch, capsys):
         return Handle()
 
     monkeypatch.setattr("asperity.runs.notebook_bar._notebook_display", lambda: display)
-    progress = Progress(3)
+    progress = RunProgress(3)
     for step in range(3):
         progress.show(step, 0.0, 0.1, 0.5)
     assert 'value="3" max="3"' in shown[-1]._repr_html_() and len(shown) >= 2
     shown.clear()
-    many = ManyProgress("sweep", 4, 3, quiet=False)
+    many = SweepProgress("sweep", 4, 3, quiet=False)
     for number, fault in enumerate((None, "no contact", None)):
         many.done(f"case{number}", fault, 1.0, 1)
     assert 'value="4" max="4"' in shown[-1]._repr_html_() and len(shown) == 3

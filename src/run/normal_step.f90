@@ -8,14 +8,14 @@ module normal_step
       new_adhesion_potential
    use adhesion_state, only : adhesion_problem_type
    use case_settings, only : adhesion_settings_type, solver_settings_type
-   use asperity_errors, only : error_input, error_type, fail
+   use asperity_errors, only : error_type
    use contact_solver, only : contact_solver_type
    use field_sums, only : field_maximum, field_mean, field_rms, row_total
    use kernels, only : kernel_type
    use normal_solvers, only : new_contact_solver
    use normal_state, only : control_approach, control_pressure, normal_problem_type
    use asperity_precision, only : dp
-   use regular_grid, only : boundary_free, grid_type
+   use regular_grid, only : grid_type
    use solver_result, only : solver_result_type
    implicit none
    private
@@ -80,11 +80,6 @@ contains
       self%rms_height = field_rms(height, field_mean(height))
       if (.not. self%adhesive) return
       self%full_contact = adhesion%start == 'full_contact'
-      if (solver%method == 'thesis' .and. self%grid%boundary == boundary_free) then
-         call fail(error, error_input, '&solver: method = ''thesis'' with &adhesion: needs boundary = '// &
-            '''periodic''; ''fast'' serves both')
-         return
-      end if
       call new_adhesion_potential(self%potential, trim(adhesion%potential), adhesion%energy, &
          adhesion%range, error, edge=edge)
       if (allocated(error)) return

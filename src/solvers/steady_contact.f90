@@ -122,7 +122,7 @@ contains
 
       if (outcome%converged()) return
       if (outcome%residual() > far_off) outcome%normal%reason = &
-         'no solution was found; a larger max_iterations seldom helps, a lower coefficient or a smoother road may'
+         'no solution was found; a larger max_iterations seldom helps, a lower load or coefficient or a smoother road may'
       if (law%jumps_at_edge()) then
          outcome%normal%reason = &
             'no solution was found, although one exists: law = ''coulomb_orowan'' with coefficient = 0.5 often has one'

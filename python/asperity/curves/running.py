@@ -16,7 +16,7 @@ from ..results import Run, open_result
 from ..roads.patches import Patch
 from ..runs.jobs import Job, take_end
 from ..runs.means import Means, run_jobs
-from ..runs.progress import Progress
+from ..runs.progress import SweepProgress
 from .plan import CurvePlan
 
 __all__ = ["CurveError", "CurveFileError", "Piece", "SubmittedError", "run_pieces"]
@@ -103,7 +103,7 @@ def run_pieces(plan: CurvePlan, folder: Path, means: Means, quiet: bool = False,
         waiting = [piece.job for piece in fresh
                    if not ((means.resume or piece.job.name in renewed) and take_end(piece.job))]
         renewed |= {piece.job.name for piece in fresh}
-        progress = Progress("friction", len(fresh), len(waiting), quiet)
+        progress = SweepProgress("friction", len(fresh), len(waiting), quiet)
         run_jobs(waiting, folder, progress, means)
         if waiting and means.slurm is not None:
             raise SubmittedError(f"{len(waiting)} runs {waiting[0].message}; the same command"

@@ -23,7 +23,7 @@ from ..base.library import call, version
 from ..results import Run, open_result
 from . import namelists
 from .case import Case
-from .progress import Progress
+from .progress import SweepProgress
 
 __all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result", "is_done",
            "may_continue", "new_ends", "run_here", "take_end", "text_of", "write_input"]
@@ -183,7 +183,7 @@ def environment() -> dict[str, str]:
 
 
 def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, resume: bool,
-             progress: Progress) -> None:
+             progress: SweepProgress) -> None:
     """Run jobs, several at a time. If this function ends early, it stops the running processes.
 
     Parameters
@@ -197,7 +197,7 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
     resume : bool
         Whether to continue from checkpoints, and to take results that another process completes
         while these jobs are waiting.
-    progress : Progress
+    progress : SweepProgress
         The display of the progress.
     """
     queue = list(waiting)

@@ -30,7 +30,7 @@ from .jobs import (
     write_input,
 )
 from .program import program
-from .progress import Progress
+from .progress import SweepProgress
 
 __all__ = ["Means", "means_of", "run_file", "run_jobs", "share_of_processors", "submit"]
 
@@ -116,7 +116,7 @@ def means_of(jobs: int | None, threads: int, resume: bool, executor: Executor | 
     return Means(most, number_of_threads("threads", threads), resume, executor, slurm)
 
 
-def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means) -> None:
+def run_jobs(waiting: list[Job], folder: Path, progress: SweepProgress, means: Means) -> None:
     """Run jobs in the chosen way.
 
     Parameters
@@ -125,7 +125,7 @@ def run_jobs(waiting: list[Job], folder: Path, progress: Progress, means: Means)
         The jobs. Their status and message are set.
     folder : Path
         Folder of their files.
-    progress : Progress
+    progress : SweepProgress
         The display of the progress.
     means : Means
         The way in which they are run.
@@ -183,7 +183,7 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
     return done.returncode, printed
 
 
-def _run_by_executor(waiting: list[Job], means: Means, progress: Progress) -> None:
+def _run_by_executor(waiting: list[Job], means: Means, progress: SweepProgress) -> None:
     """Submit the jobs to the executor, as many at a time as allowed, and wait for all of them."""
     ready = list(waiting)
     take_new_end = new_ends(waiting, means.resume)

@@ -9,10 +9,10 @@ from typing import TextIO
 from ..base.durations import duration, short_time
 from .notebook_bar import notebook_bar
 
-__all__ = ["Progress"]
+__all__ = ["SweepProgress"]
 
 
-class Progress:
+class SweepProgress:
     """The progress of many cases: one line that is rewritten in a terminal, else one per case.
 
     In a notebook a bar takes the place of the lines, except for those about failed cases.

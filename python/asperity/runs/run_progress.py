@@ -8,13 +8,13 @@ from typing import TextIO
 
 from .notebook_bar import notebook_bar
 
-__all__ = ["Progress"]
+__all__ = ["RunProgress"]
 
 _EVERY = 2.0           # time between two lines, s
 _EVERY_IN_NOTEBOOK = 0.2   # time between two updates of the bar, s
 
 
-class Progress:
+class RunProgress:
     """The progress of a run.
 
     Parameters

@@ -19,7 +19,7 @@ from ..base.files import check_folder
 from ..results import Run
 from . import namelists
 from .row import Row
-from .run_progress import Progress
+from .run_progress import RunProgress
 from .simulation import RunView, warn_of
 
 __all__ = ["run"]
@@ -159,7 +159,7 @@ def _do_rows(handle: int, span: tuple[int, int], notes: bytes, result: bytes, st
     first, rows = span
     finished = first >= rows
     view: RunView | None = None
-    progress = None if quiet else Progress(rows)
+    progress = None if quiet else RunProgress(rows)
     try:
         warn_of(notes, level=4)
         while not finished and not stops.asked:

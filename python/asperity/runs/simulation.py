@@ -40,7 +40,7 @@ _field = library.call("run_field")
 FIELDS = (*NORMAL_FIELDS, *TANGENTIAL_FIELDS, "height")
 
 _LOADS = ("pressure", "force", "displacement")
-_FOLLOWED = 1.5         # cells per step; `most_cells_per_step` of case_phases.f90, which warns before a run
+_FOLLOWED = 1.5         # cells per step, as `most_cells_per_step` of case_phases.f90
 
 
 class _CaseLike(Protocol):

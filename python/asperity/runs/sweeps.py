@@ -25,7 +25,7 @@ from . import namelists
 from .case import Case
 from .jobs import Job, is_done
 from .means import means_of, run_jobs
-from .progress import Progress
+from .progress import SweepProgress
 from .sweep_table import Failure, Sweep, SweepError, column
 
 __all__ = ["sweep"]
@@ -155,7 +155,7 @@ def sweep(
             job.status = 0
         else:
             waiting.append(job)
-    run_jobs(waiting, folder, Progress("sweep", len(work), len(waiting), quiet), means)
+    run_jobs(waiting, folder, SweepProgress("sweep", len(work), len(waiting), quiet), means)
     table = _table(work, shape, measure)
     if table.failed and errors == "raise" and slurm is None:
         lines = "\n".join(f"  {failure}" for failure in table.failed)
