@@ -129,6 +129,11 @@ contains
 
       call write_result(path, 14, 0, .false., error)
       call write_result(path, 14, 0, .true., error)
+      call check_error(error, 'the run is complete: there is nothing to continue', 'complete')
+      call file%open(path, 'append', error)
+      call file%write_attribute('/', 'finished', 0)   ! as after a kill
+      call file%close(error)
+      call write_result(path, 14, 0, .true., error)
       call check_no_error(error, 'gone on')
       call file%open(path, 'read', error)
       call file%read('/history/time', x, error)
