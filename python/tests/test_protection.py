@@ -81,6 +81,23 @@ def test_unfinished_run_without_a_checkpoint(program: str, case: Path) -> None:
     assert done.returncode == 3 and "has no checkpoint from which to continue" in done.stderr
 
 
+def test_a_file_that_takes_the_name_of_a_result_is_not_changed(program: str, case: Path) -> None:
+    """The run ends with an error, and the file with its rows is the one that had the name."""
+    result, other = case.with_suffix(".h5"), case.with_name("notes.txt")
+    moved = case.with_name("moved.h5")
+    case.write_text(vc.text(size=24, steps=4000))
+    process = vc.start(program, case)
+    vc.wait_for_rows(process, result, 3)
+    os.link(result, moved)
+    other.write_text("precious")
+    os.replace(other, result)
+    _, message = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 3
+    assert "y.h5: cannot be written: the file has been removed, moved or replaced" in message
+    assert result.read_text() == "precious"
+    assert asperity.open(moved).history.rows >= 3
+
+
 def test_overwrite_in_python(program: str, case: Path) -> None:
     """`asperity.run` has the same option."""
     result = stopped(program, case)

@@ -9,7 +9,7 @@ module file_system
    implicit none
    private
 
-   public :: rename_file, remove_file, sync_file, lengthen_file, file_exists, is_folder, &
+   public :: rename_file, remove_file, sync_file, lengthen_file, file_exists, file_identity, is_folder, &
       folder_of, name_of, is_terminal, let_size_limit_be_an_error
 
    integer(c_int), parameter :: open_read_write = 2     !! O_RDWR of every Unix
@@ -62,9 +62,9 @@ module file_system
          integer(c_intptr_t) :: old
       end function c_signal
 
-      function c_truncate(path, length) bind(c, name='truncate') result(status)
-         import :: c_char, c_int, c_int64_t
-         character(kind=c_char), intent(in) :: path(*)
+      function c_truncate(descriptor, length) bind(c, name='ftruncate') result(status)
+         import :: c_int, c_int64_t
+         integer(c_int), value :: descriptor
          integer(c_int64_t), value :: length
          integer(c_int) :: status
       end function c_truncate
@@ -110,9 +110,10 @@ contains
       if (status /= 0) call fail(error, error_file, path//': cannot be written through to the disk')
    end subroutine sync_file
 
-   !> Make a file at least this long. The bytes that are added read as zeros and take no space yet.
-   subroutine lengthen_file(path, length, error)
-      character(*), intent(in) :: path
+   !> Make an open file at least this long. The bytes that are added read as zeros and take no space yet.
+   subroutine lengthen_file(path, descriptor, length, error)
+      character(*), intent(in) :: path          !! of the file
+      integer(c_int), intent(in) :: descriptor  !! of the open file: another one may have taken its name
       integer(int64), intent(in) :: length      !! bytes
       type(error_type), allocatable, intent(inout) :: error
       integer(int64) :: now
@@ -120,10 +121,23 @@ contains
       if (allocated(error)) return
       inquire (file=path, size=now)
       if (now >= length) return
-      if (c_truncate(path//c_null_char, int(length, c_int64_t)) /= 0) then
+      if (c_truncate(descriptor, int(length, c_int64_t)) /= 0) then
          call fail(error, error_file, path//': cannot be written: the file cannot grow')
       end if
    end subroutine lengthen_file
+
+   !> The numbers of the device and of the inode of a file, which no other file has; -1 if there is none of this name.
+   !> `stat` returns only the last 32 bits of them.
+   function file_identity(path) result(identity)
+      character(*), intent(in) :: path
+      integer :: identity(2)
+      integer :: properties(13)
+      integer :: status
+
+      identity = -1
+      call stat(path, properties, status)
+      if (status == 0) identity = properties(1:2)
+   end function file_identity
 
    !> Make a write beyond the limit on the size of files fail with an error. By default the system would
    !> end the program.

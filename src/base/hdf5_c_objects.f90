@@ -14,7 +14,7 @@ module hdf5_c_objects
    private
 
    public :: group_info_type, h5dont_atexit, h5eset_auto2, h5fclose, h5fcreate, h5fflush, &
-      h5fget_filesize, h5fis_hdf5, h5fopen, h5gclose, h5gcreate2, h5gcreate_anon, &
+      h5fget_filesize, h5fget_vfd_handle, h5fis_hdf5, h5fopen, h5gclose, h5gcreate2, h5gcreate_anon, &
       h5gget_info_by_name, h5iget_type, h5lcreate_external, h5ldelete, h5lexists, &
       h5lget_name_by_idx, h5oclose, h5ocopy, h5olink, h5oopen, h5open
 
@@ -81,6 +81,13 @@ module hdf5_c_objects
          integer(hsize_t), intent(out) :: length
          integer(c_int) :: status
       end function h5fget_filesize
+
+      function h5fget_vfd_handle(file, access, handle) bind(c, name='H5Fget_vfd_handle') result(status)
+         import :: c_int, c_ptr, hid_t
+         integer(hid_t), value :: file, access
+         type(c_ptr), intent(out) :: handle
+         integer(c_int) :: status
+      end function h5fget_vfd_handle
 
       function h5fis_hdf5(name) bind(c, name='H5Fis_hdf5') result(status)
          import :: c_char, c_int

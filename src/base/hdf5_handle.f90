@@ -21,19 +21,19 @@
 !> remembered fault, until the file is opened again. If a fault must prevent a step that does not
 !> concern this file, such as removing another file, call `report` before that step.
 module hdf5_handle
-   use, intrinsic :: iso_c_binding, only : c_bool, c_int
+   use, intrinsic :: iso_c_binding, only : c_bool, c_f_pointer, c_int, c_ptr
    use asperity_errors, only : error_file, error_type, fail
    use asperity_precision, only : int64
-   use file_system, only : file_exists, folder_of, is_folder, lengthen_file
+   use file_system, only : file_exists, file_identity, folder_of, is_folder, lengthen_file
    use hdf5_c_lists, only : h5pclose, h5pcreate, h5pset_alignment, h5pset_attr_phase_change, &
       h5pset_est_link_info, h5pset_fclose_degree, h5pset_libver_bounds, h5pset_link_phase_change, &
       h5pset_meta_block_size, h5pset_small_data_block_size, h5pset_userblock
-   use hdf5_c_objects, only : h5fclose, h5fcreate, h5fflush, h5fget_filesize, h5fis_hdf5, h5fopen, &
+   use hdf5_c_objects, only : h5fclose, h5fcreate, h5fflush, h5fget_filesize, h5fget_vfd_handle, h5fis_hdf5, h5fopen, &
       h5gclose
    use hdf5_kinds, only : hid_t, hsize_t
    use hdf5_errors, only : last_reason, start_hdf5
    use hdf5_library, only : c_text, h5f_acc_rdonly, h5f_acc_rdwr, h5f_acc_trunc, h5f_close_strong, &
-      h5f_libver_v18, h5f_scope_local, h5p_file_access, h5p_file_create
+      h5f_libver_v18, h5f_scope_local, h5p_default, h5p_file_access, h5p_file_create
    implicit none
    private
 
@@ -46,6 +46,7 @@ module hdf5_handle
       logical :: writable = .false.
       character(:), allocatable :: staged_path
       character(:), allocatable :: path               !! name of the file
+      integer :: identity(2) = -1                     !! of the file that was opened, see `file_identity`
       type(error_type), allocatable :: fault          !! the first fault that is remembered
       logical :: unreported = .false.                 !! the fault has not been returned to a caller
    contains
@@ -143,6 +144,7 @@ contains
          self%id = -1
          call explain_opening(self%path, mode, error)
       end if
+      self%identity = file_identity(self%path)
       ! The lists are closed last, because HDF5 forgets the reason of a failure with its next call.
       if (creation >= 0) ignored = h5pclose(creation)
       ignored = h5pclose(access_list)
@@ -225,7 +227,8 @@ contains
       self%staged = -1
    end subroutine close_file
 
-   !> Pass all data to the operating system, so that nothing is lost if the program is killed later.
+   !> Pass all data to the operating system, so that nothing is lost if the program is killed later. It is a fault if
+   !> another file has taken the name of this one meanwhile: readers would not find what is written.
    subroutine flush_file(self, error)
       class(hdf5_handle_type), intent(inout) :: self
       type(error_type), allocatable, intent(out), optional :: error
@@ -238,7 +241,8 @@ contains
       ! find the file too short. Therefore the file gets its length first.
       status = h5fget_filesize(self%id, length)
       call self%checked(status, 'writing failed', '', fault)
-      call lengthen_file(self%path, int(length, int64), fault)
+      call check_name(self, fault)
+      call lengthen_file(self%path, descriptor_of(self), int(length, int64), fault)
       if (.not. allocated(fault)) then
          status = h5fflush(self%id, h5f_scope_local)
          call self%checked(status, 'writing failed', '', fault)
@@ -246,6 +250,30 @@ contains
       if (allocated(fault)) call remember(self, fault)
       call self%settle(fault, error)
    end subroutine flush_file
+
+   !> Check that the name still leads to the file that was opened.
+   subroutine check_name(self, error)
+      class(hdf5_handle_type), intent(in) :: self
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+
+      if (allocated(error)) return
+      if (all(file_identity(self%path) == self%identity)) return
+      call fail(error, error_file, self%path//': cannot be written: the file has been removed, moved or replaced '// &
+         'since it was opened')
+   end subroutine check_name
+
+   !> The descriptor of the open file; -1 if HDF5 does not tell it.
+   function descriptor_of(self) result(descriptor)
+      class(hdf5_handle_type), intent(in) :: self
+      integer(c_int) :: descriptor
+      integer(c_int), pointer :: number
+      type(c_ptr) :: address
+
+      descriptor = -1
+      if (h5fget_vfd_handle(self%id, h5p_default, address) < 0) return
+      call c_f_pointer(address, number)
+      descriptor = number
+   end function descriptor_of
 
    ! --- faults -------------------------------------------------------------------------------
 
