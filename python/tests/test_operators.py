@@ -1,7 +1,11 @@
 """The operators for method developers against closed forms, the solvers, and numpy's FFT."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
+from conftest import PATIENCE
 
 import asperity
 
@@ -137,3 +141,32 @@ def test_options_are_checked():
         for wrong in (-3, 0, 2.5):
             with pytest.raises(ValueError, match=r"^max_iterations = .*: must be a positive int"):
                 op.inverse(np.ones(shape), max_iterations=wrong)
+
+
+COLLECTED = """
+import gc, numpy as np, asperity
+from asperity.base import library
+
+class CollectingLock:
+    def __init__(self, lock):
+        self.lock, self.locked = lock, lock.locked
+    def __enter__(self):
+        self.lock.acquire()
+        gc.collect()
+    def __exit__(self, *error):
+        self.lock.release()
+
+gc.disable()
+gc.freeze()                                 # makes the collections short
+library._lock = CollectingLock(library._lock)
+for _ in range(30):
+    operator = asperity.operators.normal(8, 8, 1.0, modulus=1.0)
+    operator.itself = operator              # only the garbage collector frees it
+    del operator
+    asperity.surface.statistics(np.zeros((8, 8)), 1.0)
+"""
+
+
+def test_the_garbage_collector_may_free_an_operator_during_a_call():
+    """The call that is running must not wait for the one that frees the operator."""
+    subprocess.run([sys.executable, "-c", COLLECTED], check=True, timeout=PATIENCE)

@@ -445,3 +445,21 @@ def test_small_maps_and_periodic_maps_are_taken_as_they_are():
     assert whole.join == "none" and whole.count == 2
     with pytest.raises(ValueError, match="at least 16"):
         MeasuredRoad([measured(16)], 512)
+
+
+def test_an_oblong_periodic_map_is_taken_whole():
+    """A piece of it would not be periodic."""
+    square = measured(64, periodic=True)
+    oblong = MeasuredSurface(np.hstack([square.height, square.height]), 2 * square.lx, square.ly,
+                             True, "m", source=square.source)
+    odd = measured(63, periodic=True)
+    road = MeasuredRoad([oblong, square, odd], 128)
+    assert road.join == "none" and road.cells == 128 and road.notes == []
+    assert sorted(road.patch(number).height.shape for number in range(road.count)) == [
+        (63, 63), (64, 64), (64, 128)]
+    assert any("without a join" in note for note in MeasuredRoad([measured()], 64, "none").notes)
+
+
+def test_a_shortest_wave_that_leaves_nothing_is_refused_before_the_runs():
+    with pytest.raises(ValueError, match="none of those that are wanted"):
+        MeasuredRoad([measured(128)], 64, short=measured(128).lx * 0.45)

@@ -453,7 +453,8 @@ def test_a_program_behind_a_script_does_not_miss_its_parent(tmp_path, monkeypatc
     assert table.runs[0].finished
 
 
-def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program, capsys):
+@pytest.mark.parametrize("by_executor", [False, True])
+def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program, capsys, by_executor):
     """Two sweeps of one folder at once: each case is run by one of them."""
     case = sliding()
     case.phase[2].steps = 2000
@@ -466,7 +467,9 @@ def test_a_case_that_another_process_runs_is_waited_for(tmp_path, program, capsy
                                stderr=subprocess.DEVNULL)
     wait_for_rows(process, folder / name, 2)
     capsys.readouterr()
-    table = sweep(case, parameters, folder=folder, quiet=False)
+    with ThreadPoolExecutor(1) as executor:
+        table = sweep(case, parameters, folder=folder, quiet=False,
+                      executor=executor if by_executor else None)
     assert "waits for another process that runs it" in capsys.readouterr().err
     assert process.wait(PATIENCE) == 0
     assert table.failed == [] and table.runs[0].finished
@@ -580,6 +583,16 @@ def test_lists_and_numbers_can_be_set_together(tmp_path):
         ([1e6, 2e6], [1e-3, 1e-2], 1e6), ([3e6], [1e-3], 2e6)]}
     table = sweep(wave(), material, folder=tmp_path)
     assert [run.material["prony_g"].tolist() for run in table.runs] == [[1e6, 2e6], [3e6]]
+
+
+@pytest.mark.filterwarnings("ignore:.*does not agree with its checksums")
+def test_a_damaged_history_is_run_again(tmp_path):
+    path = sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path).paths[0]
+    area = asperity.open(path).history.contact_area.copy()
+    with h5py.File(path, "r+") as file:
+        file["history/contact_area"][-1] = 0.9
+    again = sweep(wave(), {"phase.pressure": [1e3]}, folder=tmp_path)
+    np.testing.assert_array_equal(again.runs[0].history.contact_area, area)
 
 
 def test_broken_results_are_run_again(tmp_path):

@@ -69,7 +69,7 @@ contains
       call table%add(prefix//'work_drive', row%work_drive, 'J', &
          'horizontal force of the drive times displacement of the road, summed')
       call table%add(prefix//'work_missing', row%work_missing, 'J', &
-         'work_load + work_drive minus all works and energies: the error of the steps')
+         'work_load + work_drive - work_normal - work_tangential - energy_radiated')
       call table%add(prefix//'energy_elastic', row%energy_elastic, 'J', &
          'energy stored in the rubber')
       call table%add(prefix//'energy_adhesive', row%energy_adhesive, 'J', 'energy of adhesion')

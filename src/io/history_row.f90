@@ -40,7 +40,7 @@ module history_row
       real(dp) :: work_tangential = 0.0_dp      !! [J] work of the tangential traction and of the driven mass
       real(dp) :: work_load = 0.0_dp            !! [J] normal force times displacement, summed over the steps
       real(dp) :: work_drive = 0.0_dp           !! [J] horizontal force of the drive times displacement of the road, summed
-      real(dp) :: work_missing = 0.0_dp         !! [J] work_load + work_drive minus all works and energies: the error of the steps
+      real(dp) :: work_missing = 0.0_dp         !! [J] work_load + work_drive - work_normal - work_tangential - energy_radiated
       real(dp) :: energy_elastic = 0.0_dp       !! [J] energy stored in the rubber
       real(dp) :: energy_adhesive = 0.0_dp      !! [J] energy of adhesion
       real(dp) :: energy_kinetic = 0.0_dp       !! [J] kinetic energy of the interface

@@ -84,7 +84,7 @@ contains
       real(dp), intent(in) :: share(2)
       real(dp) :: force                        !! Pa
 
-      force = between(self%points, pressure)*share(2)
+      force = share(1)*(between(self%points, pressure) - self%bare_strength) + share(2)*self%bare_strength
    end function force
 
    !> The bound at a pressure, on the line behind the last point at or below this pressure, which bisection finds.

@@ -79,7 +79,7 @@ def number(
         if isinstance(value, str | bytes | bool):
             raise TypeError
         result = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {shown(value)}: must be {allowed}") from None
     bad = not math.isfinite(result) or result < low or result > high
     if bad or (low_open and result == low) or (high_open and result == high):
@@ -202,10 +202,10 @@ def array_of(
     """
     no_masked(name, values)
     try:
-        if np.iscomplexobj(values):
+        if np.iscomplexobj(values) or np.asarray(values).dtype.kind in "USc":
             raise TypeError
         result = np.array(values, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {shown(values)}: must be real numbers") from None
     if ndim is not None and result.ndim != ndim:
         raise ValueError(f"{name}: has {result.ndim} dimensions, must have {ndim}")

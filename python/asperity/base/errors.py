@@ -25,7 +25,7 @@ class NotConverged(RuntimeError):  # noqa: N818 - an outcome that callers look f
         """Pickle without a result that another process cannot have, such as a simulation."""
         try:
             pickle.dumps(self.result)
-        except TypeError:
+        except (TypeError, AttributeError, pickle.PicklingError):
             return type(self), (str(self), None)
         return type(self), (str(self), self.result)
 

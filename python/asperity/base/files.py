@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -193,7 +194,8 @@ def new_file(path: Path) -> Iterator[Path]:
     check_folder(path)
     target = Path(os.path.realpath(path))
     temporary = target.is_file() or not path.exists()
-    new = target.with_name(f".{target.stem}.{os.getpid()}.new{target.suffix}")
+    mark = f"{os.getpid()}-{secrets.token_hex(4)}"  # two machines may have the same process numbers
+    new = target.with_name(f".{target.stem}.{mark}.new{target.suffix}")
     try:
         if path.exists() and not os.access(path, os.W_OK):
             raise OSError("its permissions do not allow it")

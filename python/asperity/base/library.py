@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -17,10 +19,11 @@ from asperity import _core
 from .check import choice, no_masked, number_of_threads, positive
 from .errors import raise_for_status
 
-__all__ = ["bare", "call", "check_depth", "contact_map", "flag_of_boundary", "height_map",
-           "lengths", "set_threads", "version"]
+__all__ = ["bare", "call", "check_depth", "close_soon", "contact_map", "flag_of_boundary",
+           "height_map", "lengths", "set_threads", "version"]
 
 _lock = threading.Lock()
+_to_be_closed: deque[tuple[Any, int]] = deque()   # routines, and the handles that they close
 _modules = (_core.flat_contact, _core.flat_library, _core.flat_roads, _core.flat_runs,
             _core.flat_simulations)
 
@@ -73,6 +76,7 @@ def call(name: str, *, interruptible: bool = False) -> Callable[..., tuple[Any, 
             finally:
                 if signals is not None:
                     _core.flat_library.end_interrupts(signals)
+        _close_waiting()
         raise_for_status(int(status), message)
         return tuple(outputs)
 
@@ -94,9 +98,37 @@ def bare(name: str) -> Callable[..., Any]:
     @functools.wraps(routine)
     def locked(*arguments: Any) -> Any:
         with _lock:
-            return routine(*arguments)
+            result = routine(*arguments)
+        _close_waiting()
+        return result
 
     return locked
+
+
+def close_soon(name: str, handle: int) -> None:
+    """Close a handle of the library, at once or after the call that is running.
+
+    Finalisers call this. The garbage collector may run them in the thread whose call is running,
+    and a call of the library would then wait for itself.
+
+    Parameters
+    ----------
+    name : str
+        Name of the routine that closes the handle.
+    handle : int
+        The handle.
+    """
+    _to_be_closed.append((_routine(name), handle))
+    if not _lock.locked():
+        _close_waiting()
+
+
+def _close_waiting() -> None:
+    """Close the handles whose objects no longer exist. The caller does not hold the lock."""
+    while _to_be_closed:
+        with _lock, contextlib.suppress(IndexError):  # another thread may take the last one
+            routine, handle = _to_be_closed.popleft()
+            routine(handle)
 
 
 def version() -> str:

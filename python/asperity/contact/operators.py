@@ -25,7 +25,6 @@ FloatArray = NDArray[np.float64]
 _open = library.call("operator_open")
 _apply = library.call("operator_apply")
 _symbol = library.call("operator_symbol")
-_close = library.call("operator_close")
 
 
 class _Operator:
@@ -49,7 +48,7 @@ class _Operator:
         handle, mx, my = _open(int(self._components == 2), self.nx, self.ny, self.lx, self.ly, free,
                                shear, poisson, thickness)
         self._handle, self._transform = int(handle), (int(my), int(mx))
-        weakref.finalize(self, _close, self._handle)
+        weakref.finalize(self, library.close_soon, "operator_close", self._handle)
 
     @property
     def shape(self) -> tuple[int, ...]:

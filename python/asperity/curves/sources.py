@@ -14,7 +14,7 @@ import numpy as np
 from ..base.check import poisson_ratio, shown
 from ..base.tables import is_number, text_lines, text_of
 from ..roads.measured import MeasuredSurface, load
-from ..roads.patches import DrawnRoad, MeasuredRoad, cleaned
+from ..roads.patches import DrawnRoad, MeasuredRoad, cleaned, have_equal_heights
 from ..roads.spectra import Spectrum, join_spectra, spectrum_of_map
 from ..rubber.compound import Compound
 from ..rubber.dma_fit import fit_dma, wlf_constants
@@ -85,7 +85,7 @@ def road_of(
     seed = _seed(seed)
     maps: list[MeasuredSurface] = []
     spectra: list[Spectrum] = []
-    measured = False  # whether a spectrum is that of a map or a profile
+    measured: list[MeasuredSurface] = []  # maps and profiles of which only the spectrum counts
     if options and not any(map(_is_file_of_map, sources)):
         raise ValueError(f"{', '.join(options)}: only for roads that are files of maps or profiles")
     several = sum(map(_is_file_of_map, sources)) > 1
@@ -101,10 +101,13 @@ def road_of(
             spectra.append(found)
         elif found.height.shape[0] == 1 or draw:
             clean, notes = cleaned(found, outliers)
+            if any(have_equal_heights(clean, other) for other in measured):
+                raise ValueError(f"{clean.source.get('name', 'map')}: has the heights of another"
+                                 " road: its spectrum would count twice")
+            measured.append(clean)
             spectrum = spectrum_of_map(clean.height, clean.lx, clean.ly, periodic=clean.periodic,
                                        name=str(clean.source.get("name", "map")))
             spectra.append(replace(spectrum, notes=[*notes, *spectrum.notes]))
-            measured = True
         else:
             maps.append(found)
     if maps and spectra:
@@ -201,8 +204,9 @@ def _own_options(words: str) -> tuple[str, dict[str, Any]]:
 
 def _seed(value: Any) -> int:
     """Return a seed as an int."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 0:
-        raise ValueError(f"seed = {value!r}: must be an integer >= 0")
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not (
+            0 <= value < 2**32):
+        raise ValueError(f"seed = {value!r}: must be an integer from 0 to {2**32 - 1}")
     return int(value)
 
 
@@ -355,20 +359,25 @@ def _of_namelist(path: Path) -> Compound:
         wlf = WLF(float(group.wlf_c1), float(group.wlf_c2), reference)
     given = reference if group.temperature is None else float(group.temperature)
     poisson = poisson_ratio(float(group.poisson or 0.0))
-    valid_range, shifts = _of_comments(path)
-    return Compound(series, reference, wlf, shifts if wlf else {}, valid_range=valid_range,
-                    name=path.name, poisson=poisson, usual=given)
+    valid_range, shifts, vertical = _of_comments(path)
+    return Compound(series, reference, wlf, shifts if wlf else {}, vertical if wlf else {},
+                    valid_range=valid_range, name=path.name, poisson=poisson, usual=given)
 
 
-def _of_comments(path: Path) -> tuple[tuple[float, float] | None, dict[float, float]]:
-    """Return the measured frequencies and the shifts that `asperity fit` writes as comments."""
+def _of_comments(path: Path) -> tuple[tuple[float, float] | None, dict[float, float],
+                                      dict[float, float]]:
+    """Return what `asperity fit` writes as comments.
+
+    These are the range of the measured frequencies, and the horizontal and the vertical shifts.
+    """
     found: tuple[float, float] | None = None
-    shifts: dict[float, float] = {}
+    shifts: dict[str, dict[float, float]] = {"a_T": {}, "b_T": {}}
     for line in text_of(path).splitlines():
         range_ = re.match(r"! valid range: (\S+) to (\S+) rad/s", line)
         if range_ and is_number(range_[1]) and is_number(range_[2]):
             found = float(range_[1]), float(range_[2])
-        if line.startswith("! shifts (log10 a_T): "):
-            shifts = {float(celsius): float(shift) for celsius, shift
-                      in re.findall(r"(-?[\d.]+(?:e[-+]?\d+)?) C ([-+][\d.]+)", line)}
-    return found, shifts
+        kind = re.match(r"! (?:vertical )?shifts \(log10 ([ab]_T)\): ", line)
+        if kind:
+            shifts[kind[1]] = {float(celsius): float(shift) for celsius, shift
+                               in re.findall(r"(-?[\d.]+(?:e[-+]?\d+)?) C ([-+][\d.]+)", line)}
+    return found, shifts["a_T"], shifts["b_T"]

@@ -34,7 +34,7 @@ class RowColumns:
     work_tangential: float  # work of the tangential traction and of the driven mass, J
     work_load: float  # normal force times displacement, summed over the steps, J
     work_drive: float  # horizontal force of the drive times displacement of the road, summed, J
-    work_missing: float  # work_load + work_drive minus all works and energies: the error of the steps, J
+    work_missing: float  # work_load + work_drive - work_normal - work_tangential - energy_radiated, J
     energy_elastic: float  # energy stored in the rubber, J
     energy_adhesive: float  # energy of adhesion, J
     energy_kinetic: float  # kinetic energy of the interface, J
@@ -77,7 +77,7 @@ class HistoryColumns:
     work_tangential: NDArray[np.float64]  # work of the tangential traction and of the driven mass, J
     work_load: NDArray[np.float64]  # normal force times displacement, summed over the steps, J
     work_drive: NDArray[np.float64]  # horizontal force of the drive times displacement of the road, summed, J
-    work_missing: NDArray[np.float64]  # work_load + work_drive minus all works and energies: the error of the steps, J
+    work_missing: NDArray[np.float64]  # work_load + work_drive - work_normal - work_tangential - energy_radiated, J
     energy_elastic: NDArray[np.float64]  # energy stored in the rubber, J
     energy_adhesive: NDArray[np.float64]  # energy of adhesion, J
     energy_kinetic: NDArray[np.float64]  # kinetic energy of the interface, J

@@ -81,6 +81,7 @@ class ResultFile:
     material: Material
     attributes: OpenValues
     losses: dict[int, Losses]
+    has_damaged_rows: bool  # rows of the history do not agree with their checksums
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -111,8 +112,7 @@ class ResultFile:
                 {name: np.atleast_1d(columns[name][()]) for name in names},
                 {name: text_of(columns[name].attrs.get("units", "1")) for name in names},
                 {name: text_of(columns[name].attrs.get("long_name", name)) for name in names})
-            if sums is not None:
-                self._compare(sums[()])
+            self.has_damaged_rows = sums is not None and self._is_damaged(sums[()])
             self.losses = _LossesOfRows((int(key), Losses(*(
                 np.asarray(group[name][()]) if name in group else np.zeros(0)
                 for name in Losses._fields))) for key, group in self._of_rows(file, "losses"))
@@ -131,8 +131,8 @@ class ResultFile:
         keys = [key for key in file.get(name, {}) if key.isdigit() and int(key) <= last]
         return [(key, file[name][key]) for key in sorted(keys, key=int)]
 
-    def _compare(self, sums: NDArray[np.float64]) -> None:
-        """Warn about rows of the history that do not agree with their checksums."""
+    def _is_damaged(self, sums: NDArray[np.float64]) -> bool:
+        """Return whether rows of the history do not agree with their checksums, with a warning."""
         names = sorted(name for name in self.history if name != "seconds")
         rows = min(self.history.rows, len(sums))
         table = np.ascontiguousarray(np.stack([self.history[name][:rows].astype("<f8")
@@ -143,6 +143,7 @@ class ResultFile:
             warnings.warn(f"{self.path}: the history does not agree with its checksums: the file"
                           f" is damaged in row{'s' * (len(wrong) > 1)} {listed}", UserWarning,
                           stacklevel=2)
+        return bool(wrong)
 
     @property
     def title(self) -> str:

@@ -222,7 +222,14 @@ def _reason(error: Exception) -> str:
 
 
 def to_metres(value: Any, unit: str) -> Any:
-    """Return lengths in m, rounded correctly: 60 um are 6e-5 m to the last digit."""
+    """Return lengths in m, rounded correctly: 60 um are 6e-5 m to the last digit.
+
+    Raises
+    ------
+    ValueError
+        If the unit is not known.
+    """
+    unit = choice("unit", _unit_of(unit) or "", tuple(UNITS))
     return value / _PARTS[unit] if unit in _PARTS else value * UNITS[unit]
 
 
@@ -355,8 +362,9 @@ def _dataset_unit(path: Path, reader: Any, chosen: Any) -> str | None:
         return None
     import h5py
 
-    with h5py.File(path, "r") as file:
-        return unit_of_dataset(file[chosen.name])
+    with h5py.File(path, "r", locking=False) as file:
+        found = unit_of_dataset(file[chosen.name])
+    return found if found in UNITS else None
 
 
 def _used_unit(path: Path, named: str | None, given: str | None, lengths: bool) -> str:

@@ -156,7 +156,14 @@ def own_map(path: Path) -> PlainReader | None:
             # A bare dataset, as `&surface file` takes it: heights in metres, unless its attribute
             # `units` says otherwise; lengths unknown.
             unit = unit_of_dataset(height) or "m"
+            if array.shape[1] == 1:
+                array = array[:, 0]
             return PlainReader("asperity", PlainMap(array, "surface/height", None, unit))
+        unit = unit_of_dataset(height) or "m"
+        if unit not in _METRES:
+            raise ValueError(f"{path}: surface/height has the unit {unit!r}: must be one of"
+                             f" {', '.join(_METRES)}, beside lengths in m")
+        array *= _METRES[unit]
         lx, ly = (float(np.ravel(grid.attrs[name])[0]) for name in ("lx", "ly"))
         boundary = np.ravel(grid.attrs.get("boundary", "free"))[0]
         boundary = boundary.decode() if isinstance(boundary, bytes) else str(boundary)
@@ -170,11 +177,11 @@ def own_map(path: Path) -> PlainReader | None:
 
 
 def unit_of_dataset(dataset: Any) -> str | None:
-    """Return the attribute `units` of a dataset of HDF5, or None if it is no unit of length."""
+    """Return the attribute `units` of a dataset of HDF5, or None if there is none."""
     value = dataset.attrs.get("units", "")
     text = value.decode(errors="replace") if isinstance(value, bytes) else str(value)
     unit = re.sub("[\u00b5\u03bc]", "u", text.strip())
-    return unit if unit in _METRES else None
+    return None if unit in ("", "1") else unit
 
 
 def text_map(path: Path, kind: str = "text") -> PlainReader:

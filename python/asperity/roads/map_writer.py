@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime, timezone
@@ -54,7 +55,7 @@ def new_map_file(path: Path, title: str, program: str, size: int) -> Iterator[h5
     import h5py
 
     check_output(path, MAP)
-    new = path.with_name(f"{path.name}.{os.getpid()}.new")
+    new = path.with_name(f"{path.name}.{os.getpid()}-{secrets.token_hex(4)}.new")
     try:
         with new.open("wb") as empty:
             if hasattr(os, "posix_fallocate"):

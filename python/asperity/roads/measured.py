@@ -278,6 +278,7 @@ def load(
         work.note("invert")
     if scale != 1.0:
         work.height = scale * work.height
+        jump = None if jump is None else abs(scale) * jump
         work.note("scale", factor=float(scale))
     if resample is not None:
         work.resample(resample)

@@ -90,7 +90,7 @@ class Patch:
             return False
 
 
-def _are_equal(one: MeasuredSurface, other: MeasuredSurface) -> bool:
+def have_equal_heights(one: MeasuredSurface, other: MeasuredSurface) -> bool:
     """Return whether two maps have the same heights, apart from the round-off of other units."""
     if one.height.shape != other.height.shape:
         return False
@@ -339,7 +339,7 @@ class MeasuredRoad:
                 raise ValueError(f"{one.source.get('name', 'map')}: is a profile: no patches can be"
                                  " cut from it; it serves as the spectrum of an isotropic road")
             clean, notes = cleaned(one, outliers)
-            if any(_are_equal(clean, other) for other in self._maps):
+            if any(have_equal_heights(clean, other) for other in self._maps):
                 raise ValueError(f"{one.source.get('name', 'map')}: has the heights of another map:"
                                  " its patches would count as independent ones")
             self._maps.append(clean)
@@ -348,7 +348,11 @@ class MeasuredRoad:
         whole_maps = all(one.periodic and max(one.height.shape) <= cells for one in maps)
         self.seed = seed
         self.join = choice("join", method or ("none" if whole_maps else "seam"), JOINS)
-        self.cells = self._cells(fewest, cells)
+        self._whole = self.join == "none" and whole_maps
+        self.cells = cells if self._whole else self._cells(fewest, cells)
+        if self.join == "none" and not self._whole:
+            self.notes.append("patches are cut from the maps without a join: the step at their"
+                              " edges is part of the road")
         self._places = self._cut(seed)
         self.count = len(self._places)
         steps = [max(one.lx / one.height.shape[1], one.ly / one.height.shape[0]) for one in maps]
@@ -360,6 +364,7 @@ class MeasuredRoad:
         self.whole_spectrum = join_spectra([
             spectrum_of_map(one.height, one.lx, one.ly, periodic=one.periodic,
                             name=one.source.get("name", "map")) for one in self._maps])
+        self.whole_spectrum.cut(side, self.short)  # refuses waves that leave nothing
 
     @property
     def name(self) -> str:
@@ -388,7 +393,7 @@ class MeasuredRoad:
         one = self._maps[which]
         ny, nx = one.height.shape
         step_x, step_y = one.lx / nx, one.ly / ny
-        if self.join == "none" and one.periodic and max(one.height.shape) <= self.cells:
+        if self._whole:
             height, rows, columns = one.height, ny, nx
         else:
             rows = columns = self.cells
@@ -422,7 +427,7 @@ class MeasuredRoad:
         places = []
         for which, one in enumerate(self._maps):
             ny, nx = one.height.shape
-            if self.join == "none" and one.periodic and max(ny, nx) <= self.cells:
+            if self._whole:
                 places.append((which, 0, 0))
                 continue
             along = [_starts(count, self.cells, need) for count in (ny, nx)]

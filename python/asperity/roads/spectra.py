@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import array_of, positive
+from ..base.names import counted
 from .map_work import fit_terms, polynomial
 from .mode_cells import mean_densities
 from .profile_fit import isotropic_fit
@@ -307,6 +308,9 @@ def isotropic_of_profile(wavenumber: FloatArray, psd: FloatArray, *, name: str =
                          level[piece] + slopes[piece] * (y - logs[piece]))
         found[i] = -2.0 * np.trapezoid(slope * np.exp(value - y), t)
     good = found > 0.0
+    if good.sum() < 2:
+        raise ValueError(f"{name}: {int(good.sum())} of {counted(k.size, 'band')} of the profile"
+                         " can belong to an isotropic road: must be at least 2")
     notes = [] if good.all() else [f"{name}: {int((~good).sum())} bands of the profile have no"
                                    " isotropic counterpart and are left out"]
     return Spectrum(k[good], found[good], name, notes)
@@ -347,7 +351,7 @@ def join_spectra(spectra: Sequence[Spectrum], name: str | None = None) -> Spectr
         raise ValueError("spectra: must have at least one")
     notes = [note for one in spectra for note in one.notes]
     if len(spectra) == 1:
-        return spectra[0]
+        return spectra[0] if name is None else replace(spectra[0], name=name)
     low = min(one.wavenumber[0] for one in spectra)
     high = max(one.wavenumber[-1] for one in spectra)
     knots = np.unique(np.concatenate([one.wavenumber for one in spectra]))

@@ -25,15 +25,16 @@ from . import namelists
 from .case import Case
 from .progress import SweepProgress
 
-__all__ = ["UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result", "is_done",
-           "may_continue", "new_ends", "run_here", "take_end", "text_of", "write_input"]
+__all__ = ["PAUSE", "UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result",
+           "is_done", "is_used", "may_continue", "new_ends", "run_here", "take_end", "text_of",
+           "write_input"]
 
 _map_checksum = call("map_checksum")
 
 _POLL = 0.02            # time between two checks of the processes, s
 _ECHO = 0.3             # two signals within this time, s, count as one (to us and to our group)
 _PATIENCE = 60.0        # time that a stopped process has for its checkpoint, s
-_PAUSE = 1.0            # before a case that another process is running is looked at again, s
+PAUSE = 1.0             # before a case that another process is running is looked at again, s
 # Words of the program about a file from which it cannot continue, with status 3. Other causes of
 # this status, such as a full disk, leave the checkpoint as it is for the next call. The words are
 # such that the name of a file, which the message contains, hardly has them.
@@ -98,14 +99,19 @@ def new_ends(waiting: list[Job], resume: bool) -> Callable[[Job], bool]:
 
 
 def found_result(job: Job) -> Run | None:
-    """Return the result if its input and height maps are those of the job, otherwise None."""
+    """Return the result if its input and height maps are those of the job, otherwise None.
+
+    A result with a damaged history does not count, because its numbers may be wrong.
+    """
     if not job.path.exists():
         return None
     try:
         run = open_result(job.path)
     except OSError:
         return None
-    return run if run.input == text_of(job) and _has_the_same_maps(run, job) else None
+    if run.has_damaged_rows or run.input != text_of(job):
+        return None
+    return run if _has_the_same_maps(run, job) else None
 
 
 def may_continue(job: Job) -> bool:
@@ -227,10 +233,10 @@ def run_here(waiting: list[Job], command: str, side_by_side: int, threads: int, 
                         _start(job, command, threads, restart=False)
                         continue
                     running.remove(job)
-                    if _is_used(job):
+                    if is_used(job):
                         if not job.due:
                             progress.note(f"{job.name} waits for another process that runs it")
-                        job.due = time.monotonic() + _PAUSE
+                        job.due = time.monotonic() + PAUSE
                         queue.append(job)
                     else:
                         count(job)
@@ -318,8 +324,8 @@ def _finish(job: Job) -> bool:
     return False
 
 
-def _is_used(job: Job) -> bool:
-    """Return whether another process is writing the result of a case."""
+def is_used(job: Job) -> bool:
+    """Return whether a run was refused because another process is writing its result."""
     return job.status == 3 and ": is in use by " in job.message
 
 

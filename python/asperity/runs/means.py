@@ -18,12 +18,14 @@ from ..base.check import number_of_threads, shown, whole
 from ..base.files import write_text
 from .case import Case
 from .jobs import (
+    PAUSE,
     UNSUITABLE,
     Job,
     Stops,
     begins_again,
     environment,
     is_done,
+    is_used,
     may_continue,
     new_ends,
     run_here,
@@ -184,7 +186,10 @@ def run_file(path: str, threads: int, restart: bool) -> tuple[int, str]:
 
 
 def _run_by_executor(waiting: list[Job], means: Means, progress: SweepProgress) -> None:
-    """Submit the jobs to the executor, as many at a time as allowed, and wait for all of them."""
+    """Submit the jobs to the executor, as many at a time as allowed, and wait for all of them.
+
+    A case that another process is running is submitted again later.
+    """
     ready = list(waiting)
     take_new_end = new_ends(waiting, means.resume)
     running: dict[Future[tuple[int, str]], Job] = {}
@@ -192,24 +197,38 @@ def _run_by_executor(waiting: list[Job], means: Means, progress: SweepProgress) 
     with Stops() as stops:
         try:
             while (ready or running) and not stops.asked:
-                while ready and len(running) < most:
-                    job = ready.pop(0)
+                due = [job for job in ready if job.due <= time.monotonic()]
+                for job in due[:most - len(running)]:
+                    ready.remove(job)
                     if take_new_end(job):
                         progress.done(job.name, job.message if job.status else None, job.seconds,
                                       len(ready) + len(running))
                     else:
                         running[_submit_to_executor(job, means)] = job
-                done, _ = concurrent.futures.wait(
-                    running, timeout=_POLL, return_when=concurrent.futures.FIRST_COMPLETED)
-                for future in done:
+                for future in _ended(running):
                     job = running.pop(future)
                     _take(job, future)
+                    if is_used(job):
+                        if not job.due:
+                            progress.note(f"{job.name} waits for another process that runs it")
+                        job.due = time.monotonic() + PAUSE
+                        ready.append(job)
+                        continue
                     progress.done(job.name, job.message if job.status else None,
                                   job.seconds, len(ready) + len(running))
         finally:
             for future in running:
                 future.cancel()
             progress.end()
+
+
+def _ended(running: dict[Future[tuple[int, str]], Job]) -> set[Future[tuple[int, str]]]:
+    """Wait for a short time, and return the runs that have ended."""
+    if not running:
+        time.sleep(_POLL)
+        return set()
+    return concurrent.futures.wait(running, timeout=_POLL,
+                                   return_when=concurrent.futures.FIRST_COMPLETED).done
 
 
 def _submit_to_executor(job: Job, means: Means) -> Future[tuple[int, str]]:

@@ -32,7 +32,6 @@ _progress = library.call("simulation_progress")
 _steer = library.call("simulation_steer")
 _save = library.call("simulation_save")
 _load = library.call("simulation_load")
-_close = library.call("simulation_close")
 _row = library.call("run_row")
 _field = library.call("run_field")
 
@@ -174,7 +173,7 @@ class Simulation:
                                                     threads or 0)
         self._path, self._text = path, text or namelists.decode(Path(path).read_bytes())
         self._handle = int(handle)
-        self._release = weakref.finalize(self, _close, self._handle)
+        self._release = weakref.finalize(self, library.close_soon, "simulation_close", self._handle)
         self._steered: dict[str, Any] = {}
         self._rows, self._shape, self._finished = int(rows), (int(ny), int(nx)), False
         self._lengths = float(lx), float(ly)

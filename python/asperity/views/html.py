@@ -124,7 +124,7 @@ def contact_html(contact: Any) -> str:
     """Return a solved contact as a table of its numbers."""
     rows = [(f"<code>{name}</code>", shown(getattr(contact, name), units))
             for name, units in _CONTACT.items() if hasattr(contact, name)]
-    ny, nx = contact.pressure.shape
+    ny, nx = (1, *contact.pressure.shape)[-2:]
     rows.append(("largest pressure", shown(contact.pressure.max(), "Pa")))
     state = "converged" if contact.converged else f"not converged: {contact.reason}"
     return table_html((), rows, f"<b>Contact</b> of {nx} × {ny} cells, {escape(state)}")
