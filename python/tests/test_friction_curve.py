@@ -1028,7 +1028,7 @@ def test_rubber_of_several_kinds(tmp_path):
     ([ROAD, "--material", "r.nml", "--pressures", "1e200"], "pressures: 1e+200 Pa: must be from"),
     ([ROAD, "--material", "r.nml", "--speeds", "-1,2"], "speeds[0] = -1.0"),
     ([ROAD, "--material", "r.nml", "--temperatures", "-99"], "temperature = -99: a_T = inf by"),
-    ([ROAD, "--material", "r.nml", "--seed", "-3"], "seed = -3: must be an integer >= 0"),
+    ([ROAD, "--material", "r.nml", "--seed", "-3"], "seed = -3: must be an integer from 0"),
     ([ROAD, "--material", "r.nml", "--wlf", "8", "120"], "wlf (--wlf): is for DMA tables only"),
     ([ROAD, "--material", "r.nml", "--temperature-tolerance", "1"], "is for DMA tables only"),
     ([ROAD, "--material", "r.nml", "--column", "storage=2"], "--column): is for DMA tables"),
@@ -1059,7 +1059,7 @@ def test_wrong_arguments(tmp_path, monkeypatch, capsys, words, message):
 
 @pytest.mark.parametrize(("height", "message"), [
     (np.zeros((48, 48)), "road.h5: is flat: must have roughness"),
-    (np.random.default_rng(1).normal(0.0, 1e-6, (12, 14)), "cells = 16: the maps have 12 cells"),
+    (np.random.default_rng(1).normal(0.0, 1e-6, (12, 14)), "road.h5: is too small for a spectrum"),
     (np.random.default_rng(1).normal(0.0, 1e-6, (20, 20)), "road.h5: is too small for a spectrum"),
 ])
 def test_roads_that_are_refused(tmp_path, monkeypatch, capsys, height, message):
@@ -1446,3 +1446,20 @@ def test_python_gives_a_data_set(tmp_path):
     assert dict(found.sizes)["speed"] == 2 and dict(found.sizes)["patch"] == 2
     assert float(found["friction"].min()) > 0.0
     assert bool(np.isnan(found["temperature"].values).all())
+
+
+def test_a_fitted_namelist_keeps_the_vertical_shifts(tmp_path):
+    fit = "! shifts (log10 a_T): 20 C +0.000, 40 C -1.000\n" \
+          "! vertical shifts (log10 b_T): 20 C +0.000, 40 C +0.030\n"
+    (tmp_path / "r.nml").write_text(fit + NAMELIST)
+    rubber = compound_of(tmp_path / "r.nml")
+    assert rubber.b_t(40.0) == pytest.approx(10**0.03)
+
+
+def test_the_same_heights_do_not_count_twice_in_a_spectrum(tmp_path):
+    height = asperity.surface.self_affine(96, lx=1e-3, wavelength_long=2e-4, wavelength_short=8e-5,
+                                          rms_slope=0.1, seed=3)
+    for name in ("a.h5", "b.h5"):
+        asperity.surface.save(tmp_path / name, height, 1e-3)
+    with pytest.raises(ValueError, match=r"b\.h5: has the heights of another road"):
+        road_of([tmp_path / "a.h5", tmp_path / "b.h5"], draw=True)

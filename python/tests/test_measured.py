@@ -999,3 +999,18 @@ def test_the_message_on_a_damaged_file_names_it(tmp_path):
     (tmp_path / "road.h5").write_bytes((tmp_path / "road.h5").read_bytes()[:2000])
     with pytest.raises(OSError, match=r"road\.h5: cannot be read as HDF5"):
         load(tmp_path / "road.h5", unit="um")
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("um", 1e-6), ("m", 1.0), ("1", 1.0), ("cm", None)])
+def test_the_unit_of_the_heights_counts_beside_lengths_in_metres(tmp_path, unit, factor):
+    path = tmp_path / "map.h5"
+    height = np.random.default_rng(1).standard_normal((8, 8))
+    with h5py.File(path, "w") as file:
+        file["surface/height"] = height
+        file["surface/height"].attrs["units"] = unit
+        file.create_group("grid").attrs.update(lx=1.0, ly=1.0)
+    if factor is None:
+        with pytest.raises(ValueError, match="surface/height has the unit 'cm': must be one of"):
+            load(path)
+    else:
+        np.testing.assert_allclose(load(path, level="none").height, factor * height, rtol=1e-12)

@@ -362,7 +362,7 @@ def _dataset_unit(path: Path, reader: Any, chosen: Any) -> str | None:
         return None
     import h5py
 
-    with h5py.File(path, "r", locking=False) as file:
+    with h5py.File(path, "r") as file:  # with locks, as the reader has opened it
         found = unit_of_dataset(file[chosen.name])
     return found if found in UNITS else None
 
