@@ -8,7 +8,7 @@
 module field_columns
    use asperity_parallel, only : process_count, process_number
    use process_exchange, only : exchange
-   use asperity_precision, only : dp
+   use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    implicit none
    private
@@ -154,7 +154,7 @@ contains
 
       parts = process_count()*rounds
       n = process*rounds + round
-      range = [int(int(n - 1, kind=8)*blocks/parts) + 1, int(int(n, kind=8)*blocks/parts)]
+      range = [int(int(n - 1, int64)*blocks/parts) + 1, int(int(n, int64)*blocks/parts)]
    end function blocks_of
 
    !> How many numbers this process sends to each process (1), and receives from each (2), before the work.

@@ -105,7 +105,7 @@ contains
          'residual of the tangential solution, recomputed')
       call table%add(prefix//'passes', row%passes, 'passes of a step with friction')
       call table%add(prefix//'residual_coupling', row%residual_coupling, '1', &
-         'mismatch between the road under the computed surface and the road solved on')
+         'error of the last pass: change of the road under the rubber, relative')
       call table%add(prefix//'ffts', row%ffts, '1', &
          'real transforms of the size of the operator; smaller ones count in part')
       call table%add(prefix//'seconds', row%seconds, 's', 'wall time of the solvers')

@@ -57,7 +57,7 @@ module history_row
       real(dp) :: residual_normal = 0.0_dp      !! [1] residual of the normal solution, recomputed
       real(dp) :: residual_tangential = 0.0_dp  !! [1] residual of the tangential solution, recomputed
       integer :: passes = 0                     !! passes of a step with friction
-      real(dp) :: residual_coupling = 0.0_dp    !! [1] mismatch between the road under the computed surface and the road solved on
+      real(dp) :: residual_coupling = 0.0_dp    !! [1] error of the last pass: change of the road under the rubber, relative
       real(dp) :: ffts = 0.0_dp                 !! [1] real transforms of the size of the operator; smaller ones count in part
       real(dp) :: seconds = 0.0_dp              !! [s] wall time of the solvers
    end type history_row_type

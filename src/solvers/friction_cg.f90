@@ -317,14 +317,16 @@ contains
       end if
    end function reason
 
-   !> Move the ends of the springs until the total of T equals the pull. A plain move, by the missing total times the
-   !> compliance of the springs, does not go beyond the solution (with slopes this is not proved), and gains the part of the
-   !> missing total that it supplies.
+   !> Move the ends of the springs until the total of T equals the pull. A plain move is the missing total times the
+   !> compliance of the springs. Without slopes it cannot go beyond the solution. `gained` is the part of the missing total
+   !> that a move has supplied.
+   !>
    !> Near full slip each move gains less than the one before. Therefore the next move is longer (`factor`) if a move
    !> gained little. If a longer move has gone too far, the ends are between the last two places, and this interval is
-   !> halved (`reach`) until plain moves are longer. A mass that is softer than the springs may move far; if all points slip, its
-   !> place follows at once from the force that is missing. If nothing is gained in full slip while the road moves further and
-   !> further from its place, the pull exceeds the friction, and the road returns to where the springs began.
+   !> halved (`reach`) until plain moves are longer. A mass that is softer than the springs may have to move far; if all
+   !> points slip, its place follows at once from the force that is missing. If nothing is gained in full slip while the
+   !> road moves further and further from its place, the pull exceeds the friction, and the road returns to where the
+   !> springs began.
    subroutine match_pull(self, problem, operator, required, iterations, converged)
       type(friction_solver_type), intent(inout) :: self
       type(friction_problem_type), intent(inout) :: problem

@@ -33,6 +33,7 @@ module asperity_interpolation
    use cubic_spline, only : most_places, spline_coefficients, spline_run
    use asperity_errors, only : error_input, error_type, fail
    use asperity_precision, only : dp
+   use field_copies, only : copy_field
    use field_sums, only : field_minimum
    use regular_grid, only : boundary_periodic, grid_type
    use road_rows, only : new_road_rows, road_rows_type
@@ -91,18 +92,6 @@ contains
          call copy_field(height, self%rows%values(:, :grid%rows()))
       end if
    end subroutine new_interpolation
-
-   !> Copy a field.
-   subroutine copy_field(from, to)
-      real(dp), intent(in) :: from(:, :)
-      real(dp), intent(out) :: to(:, :)
-      integer :: j
-
-      !$omp parallel do default(none) shared(from, to)
-      do j = 1, size(from, 2)
-         to(:, j) = from(:, j)
-      end do
-   end subroutine copy_field
 
    !> The heights of the map, moved by whole cells. Outside a free map the height is its lowest one.
    subroutine moved_height(self, whole, height)

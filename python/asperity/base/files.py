@@ -141,7 +141,7 @@ def make_folder(folder: Path) -> None:
 def check_output(path: Path, kind: str, *others: str) -> None:
     """Refuse a file that cannot be written, or would replace a file of another kind.
 
-    An empty file may be replaced, and so may a device or a pipe be written to.
+    An empty file may be replaced, and devices and pipes may be written to.
 
     Parameters
     ----------

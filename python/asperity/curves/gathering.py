@@ -53,7 +53,7 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
     values = {name: np.full((*axes, plan.patches), math.nan)
               for name in (*_NAMES, "friction_loss")}
     sources: dict[tuple[int, int, int], tuple[Path, int]] = {}
-    lost: list[tuple[Piece, int, Run]] = []
+    results: list[tuple[Piece, int, Run]] = []
     for piece, _ in pieces:
         run, rows, _ = piece.rows()
         for row in range(rows):
@@ -64,10 +64,10 @@ def gather(plan: CurvePlan, pieces: list[tuple[Piece, Patch]], extend: float | N
             values["friction_loss"][(*at, piece.patch)] = run.history["power_viscous"][row] / work
             if piece.patch == 0:
                 sources[at] = (piece.job.path, int(run.history["step"][row]))
-        lost.append((piece, rows, run))
+        results.append((piece, rows, run))
     values["friction_interface"] = values["friction"] - values["friction_viscous"]
-    notes = [*plan.all_notes, *_join_note(plan, lost)]
-    losses, octave = _losses(plan, lost)
+    notes = [*plan.all_notes, *_join_note(plan, results)]
+    losses, octave = _losses(plan, results)
     curve = FrictionCurve(
         plan.pressure, plan.temperature, plan.speed, _labels(pieces), values,
         _theory(plan, pieces, extend), losses, octave, plan.compound.series.tau,
@@ -151,12 +151,12 @@ def _is_wider(whole: Spectrum, kept: Spectrum) -> bool:
             or whole.wavenumber[-1] > 1.001 * kept.wavenumber[-1])
 
 
-def _join_note(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]) -> list[str]:
+def _join_note(plan: CurvePlan, results: list[tuple[Piece, int, Run]]) -> list[str]:
     """Return a note on the share of the load that the joins of the patches carry."""
     if plan.road.join == "none":
         return []
     shares = [load_at_join(run.snapshots[-1].pressure, plan.road.join)
-              for _, rows, run in lost if rows and len(run.snapshots)]
+              for _, rows, run in results if rows and len(run.snapshots)]
     if not shares:
         return []
     load, area = np.mean(shares, axis=0)
@@ -164,14 +164,14 @@ def _join_note(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]) -> list[str]
             f" lies at the join, on {100 * area:.1f} % of the area"]
 
 
-def _losses(plan: CurvePlan, lost: list[tuple[Piece, int, Run]]
+def _losses(plan: CurvePlan, results: list[tuple[Piece, int, Run]]
             ) -> tuple[dict[str, FloatArray], FloatArray]:
     """Return the losses by octave and by arm, as means over the patches, and the octaves."""
     axes = (plan.pressure.size, plan.temperature.size, plan.speed.size)
     sums: dict[str, FloatArray] = {}
     count = np.zeros(axes)
     octave = np.zeros(0)
-    for piece, rows, run in lost:
+    for piece, rows, run in results:
         for row in range(rows):
             found = run.losses.get(int(run.history["step"][row]))
             if found is None:

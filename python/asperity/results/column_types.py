@@ -49,7 +49,7 @@ class RowColumns:
     residual_normal: float  # residual of the normal solution, recomputed
     residual_tangential: float  # residual of the tangential solution, recomputed
     passes: int  # passes of a step with friction
-    residual_coupling: float  # mismatch between the road under the computed surface and the road solved on
+    residual_coupling: float  # error of the last pass: change of the road under the rubber, relative
     ffts: float  # real transforms of the size of the operator; smaller ones count in part
     seconds: float  # wall time of the solvers, s
 
@@ -92,6 +92,6 @@ class HistoryColumns:
     residual_normal: NDArray[np.float64]  # residual of the normal solution, recomputed
     residual_tangential: NDArray[np.float64]  # residual of the tangential solution, recomputed
     passes: NDArray[np.int32]  # passes of a step with friction
-    residual_coupling: NDArray[np.float64]  # mismatch between the road under the computed surface and the road solved on
+    residual_coupling: NDArray[np.float64]  # error of the last pass: change of the road under the rubber, relative
     ffts: NDArray[np.float64]  # real transforms of the size of the operator; smaller ones count in part
     seconds: NDArray[np.float64]  # wall time of the solvers, s

@@ -3,9 +3,10 @@
 A contact with periodic boundaries needs a map that continues at the opposite edge. A good join
 carries the load that belongs to its share of the area, not more and not less.
 
-* ``'seam'`` takes a margin of real road beyond two edges and lays it over the opposite edges. Both
-  parts are cut along the line on which their heights differ least, with a transition of some cells.
-  All heights are those of the road, so that no new summit or valley arises.
+* ``'seam'`` takes a strip of measured road beyond two edges, and overlaps it with the strip at the
+  opposite edges. Of each of the two strips one side of a line is kept. The line runs where their
+  heights differ least, with a transition of some cells. All heights are those of the road, so that
+  no new summit or valley arises.
 * ``'blend'`` fades such a margin into the opposite edges. The squares of the weights add up to 1,
   so that the roughness keeps its rms height. If both parts are high at the same place, as on a road
   with flat tops, the sum rises above the road and carries too much load.

@@ -1,7 +1,7 @@
 """The spectrum of the isotropic road that a single measured profile most probably belongs to.
 
 Abel's transform of the measured density differentiates its noise, and a profile has only a few long
-waves, so that the road came out too rough by up to 40 %. Here the spectrum of the road, Phi, is
+waves: roads made in this way were up to 40 % too rough. Here the spectrum of the road, Phi, is
 fitted instead. The density of the profiles of a road is
 
     Phi1(k) = 1/pi int_k^inf Phi(q) q dq/sqrt(q^2 - k^2).
