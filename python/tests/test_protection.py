@@ -81,6 +81,17 @@ def test_unfinished_run_without_a_checkpoint(program: str, case: Path) -> None:
     assert done.returncode == 3 and "has no checkpoint from which to continue" in done.stderr
 
 
+@pytest.mark.parametrize("letters", [237, 238])
+def test_a_name_leaves_room_for_that_of_the_checkpoint(program: str, case: Path, letters: int
+                                                       ) -> None:
+    """Without a checkpoint a stopped run could not be continued."""
+    case.write_text(vc.text(size=24, steps=2, output="checkpoint_every = 1"))
+    done = vc.run(program, case, "--output", str(case.with_name(letters * "n" + ".h5")))
+    assert done.returncode == (0 if letters < 238 else 3)
+    if done.returncode:
+        assert "the name is too long: those of the files beside it have up to 256" in done.stderr
+
+
 def test_a_file_that_takes_the_name_of_a_result_is_not_changed(program: str, case: Path) -> None:
     """The run ends with an error, and the file with its rows is the one that had the name."""
     result, other = case.with_suffix(".h5"), case.with_name("notes.txt")

@@ -8,9 +8,10 @@ module result_target
    use asperity_errors, only : error_file, error_type, fail
    use asperity_precision, only : dp
    use file_kind, only : file_start, is_dangling_link, is_other_than_file
-   use file_system, only : file_exists, folder_of, is_folder
+   use file_system, only : file_exists, folder_of, is_folder, name_of
    use hdf5_file, only : hdf5_file_type
    use result_names, only : checkpoint_path, side_file, side_files
+   use text_tools, only : to_text
    use trial_process, only : trial_type
    implicit none
    private
@@ -18,6 +19,7 @@ module result_target
    public :: check_place, check_replaced, damage_of_result
 
    integer, parameter :: patience = 60       !! longest time for the trial of a result, s
+   integer, parameter :: longest_name = 255  !! NAME_MAX of Linux and macOS, bytes
 
    !> The kinds of files that may be there.
    integer, parameter :: is_result = 1, is_unfinished = 2, is_alien = 3
@@ -28,9 +30,13 @@ contains
    subroutine check_place(path, error)
       character(*), intent(in) :: path          !! of the result
       type(error_type), allocatable, intent(out) :: error
-      integer :: n
+      integer :: letters, n
 
-      if (is_folder(path)) then
+      letters = maxval([(len(name_of(side_file(path, n))), n=1, side_files)])
+      if (letters > longest_name) then
+         call fail(error, error_file, path//': the name is too long: those of the files beside it have up to '// &
+            to_text(letters)//' bytes, and at most '//to_text(longest_name)//' are allowed')
+      else if (is_folder(path)) then
          call fail(error, error_file, path//': is a folder, not a file')
       else if (.not. is_folder(folder_of(path))) then
          call fail(error, error_file, path//': cannot be written: there is no folder "'// &
