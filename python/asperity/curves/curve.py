@@ -98,7 +98,7 @@ def friction_curve(
         31.7 on drawn ones.
     join : str, optional
         How patches of measured maps are made periodic: 'seam', 'blend', 'smooth', 'mirror',
-        'window'.
+        'window', or 'none', which leaves a step at the edges of maps that are not periodic.
     outliers : {'report', 'remove'}
         What to do about single cells of maps, or points of profiles, that differ strongly from
         their neighbours.
