@@ -125,8 +125,10 @@ contains
          law = new_friction_law('table', 0.0_dp, 0.0_dp, 0.0_dp, .false., .true., up)
          call check_close(law%bound_ratio(pressures(k), none, [0.6_dp, 0.8_dp]), rising(k), 1e-14_dp, 'rising table')
          call check_close(row_ratio(law, pressures(k), none, [0.6_dp, 0.8_dp]), rising(k), 1e-14_dp, 'row')
-         call check_close(law%bound_ratio(pressures(k), none, [0.0_dp, 1.0_dp], [1.0_dp, 0.5_dp]), &
+         call check_close(law%bound_ratio(pressures(k), none, [0.0_dp, 1.0_dp], [0.5_dp, 0.5_dp]), &
             0.5_dp*rising(k), 1e-14_dp, 'half a cell')
+         call check_close(law%bound_ratio(pressures(k), none, [0.0_dp, 1.0_dp], [1.0_dp, 0.5_dp]), &
+            rising(k) - 0.5_dp*up(1, 2), 1e-14_dp, 'half of the bound without pressure')
          law = new_friction_law('table', 0.0_dp, 0.0_dp, 0.0_dp, .false., .true., down)
          call check_close(law%bound_ratio(pressures(k), none, [1.0_dp, 0.0_dp]), falling(k), 1e-14_dp, 'falling table')
       end do
