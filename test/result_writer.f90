@@ -3,6 +3,7 @@ module result_writer
    use, intrinsic :: iso_fortran_env, only : error_unit
    use asperity_checkpoint, only : checkpoint_reader_type, checkpoint_writer_type
    use asperity_errors, only : error_type
+   use hdf5_file, only : hdf5_file_type
    use history_row, only : history_row_type
    use asperity_precision, only : dp, int8
    use regular_grid, only : boundary_periodic, grid_type, new_grid
@@ -67,6 +68,7 @@ contains
       logical, intent(in) :: restart        !! continue from the checkpoint
       type(error_type), allocatable, intent(out) :: error
       type(result_file_type) :: output
+      type(hdf5_file_type) :: file
       type(checkpoint_writer_type) :: state
       type(checkpoint_reader_type) :: old
       type(error_type), allocatable :: closing
@@ -77,7 +79,11 @@ contains
       grid = new_grid(nx, ny, 14.0_dp, 4.0_dp, boundary_periodic)
       first = 0
       if (restart) then
-         call old%open(path, error)
+         ! The process has died before its end, or there would be nothing to continue.
+         call file%open(path, 'append')
+         call file%write_attribute('/', 'finished', 0)
+         call file%close(error)
+         if (.not. allocated(error)) call old%open(path, error)
          if (allocated(error)) return
          call read_state(first)
          if (allocated(error)) return

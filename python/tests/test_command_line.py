@@ -357,8 +357,9 @@ def test_info_of_a_killed_run_says_how_long_a_row_takes(program, tmp_path):
         file["history/seconds"][-1] = 2.25
     done = call(program, "info", "case.h5", cwd=tmp_path)
     assert re.search(r"(?m)^rows +1 of 7$", done.out)
-    assert ("not recorded: the run continues, or was killed, or could not write its result, as on a"
-            " full disk; the last row took 2.25 s; check whether rows are being added") in done.out
+    assert ("not recorded. The run continues, or its process has ended: it was killed, or it could"
+            " not write its result (for example, because the disk was full); the last row took 2.25"
+            " s; check whether rows are being added") in done.out
 
 
 def test_info(program, tmp_path):

@@ -62,7 +62,6 @@ contains
       character(*), intent(in), optional :: beginning   !! of the message, instead of that for the present contact
       character(:), allocatable :: message
       character(:), allocatable :: consequence, start
-      character(6) :: cells
 
       message = ''
       start = 'patches of contact are only '
@@ -73,9 +72,8 @@ contains
       consequence = 'the approach can be more than 1 % wrong, and area and pressures depend on the cells'
       if (.not. patches%needed > needed_by_many) &
          consequence = 'the contact area is more than 10 % too large, and approach and pressures depend on the cells'
-      cells = merge(' cell ', ' cells', nint(10.0_dp*patches%across) == 10)
       ! The cells are counted in tenths, the factor is rounded up.
-      message = start//tenths(patches%across)//trim(cells)//' across on average: below '// &
+      message = start//tenths(patches%across)//' cells across on average: below '// &
          tenths(patches%needed)//' '//consequence//'; use cells at most 1/'// &
          tenths(patches%needed/patches%across + 0.05_dp)// &
          ' as wide for the same road, if need be on a smaller map around the contact'
