@@ -15,7 +15,7 @@ module case_report
    implicit none
    private
 
-   public :: case_summary, resolved_input
+   public :: case_summary, control_units, resolved_input
 
    character(*), parameter :: nl = new_line('a')
 
@@ -250,6 +250,7 @@ contains
       if (case%grid%boundary == boundary_free) name = 'free'
    end function boundary_name
 
+   !> The unit of the load of a phase.
    pure function control_units(control) result(units)
       character(*), intent(in) :: control
       character(:), allocatable :: units

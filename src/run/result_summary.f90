@@ -4,6 +4,7 @@
 !> write it. The warnings of the input and of the run follow.
 module result_summary
    use case_input, only : parse_case
+   use case_report, only : control_units
    use case_settings, only : case_type
    use asperity_errors, only : error_file, error_type, fail
    use file_lock, only : lock_free, lock_held, state_of_lock
@@ -209,7 +210,7 @@ contains
       do i = 1, size(case%phases)
          associate (phase => case%phases(i))
             text = text//'  '//to_text(i)//'         '//trim(phase%name)//': '//trim(phase%control)//' '// &
-               to_text(phase%target)//' '//unit_of_load(phase%control)
+               to_text(phase%target)//' '//control_units(phase%control)
             speed = norm2([phase%velocity_x, phase%velocity_y])
             if (phase%relaxed) text = text//', relaxed'
             if (phase%steady) text = text//', steady sliding'
@@ -220,21 +221,6 @@ contains
          end associate
       end do
    end function phases_text
-
-   !> The unit of the load of a phase.
-   pure function unit_of_load(control) result(unit)
-      character(*), intent(in) :: control            !! 'pressure' | 'force' | 'displacement'
-      character(:), allocatable :: unit
-
-      select case (control)
-      case ('pressure')
-         unit = 'Pa'
-      case ('force')
-         unit = 'N'
-      case default
-         unit = 'm'
-      end select
-   end function unit_of_load
 
    !> Add the last row of the history, and the largest residuals of all rows.
    subroutine history_text(file, area, text, error)
