@@ -106,31 +106,54 @@ contains
       integer, intent(in) :: j                     !! number of the row
       real(dp), intent(in) :: pressure(self%nx), gap(self%nx)   !! Pa and m
       real(dp), intent(out) :: lowest              !! least gap of the row, m
-      integer :: b, first, last, i
-      real(dp) :: least, most
+      integer :: b, first, last
 
       lowest = huge(1.0_dp)
       do b = 1, size(self%least, 1)
          first = (b - 1)*width + 1
          last = min(b*width, self%nx)
-         least = gap(first)
-         !$omp simd reduction(min:least)
-         do i = first + 1, last
-            least = min(least, gap(i))
-         end do
-         self%least(b, j) = least
-         lowest = min(lowest, least)
-         ! There is no pressure where the solver has not worked.
-         most = 0.0_dp
-         if (everywhere .or. self%live(b, j)) then
-            !$omp simd reduction(max:most)
-            do i = first, last
-               most = max(most, pressure(i))
-            end do
+         if (last - first + 1 == width) then
+            self%least(b, j) = least_of_block(gap(first))
+         else
+            self%least(b, j) = minval(gap(first:last))
          end if
-         self%loaded(b, j) = most > 0.0_dp
+         lowest = min(lowest, self%least(b, j))
+         ! There is no pressure where the solver has not worked.
+         self%loaded(b, j) = .false.
+         if (.not. (everywhere .or. self%live(b, j))) cycle
+         if (last - first + 1 == width) then
+            self%loaded(b, j) = most_of_block(pressure(first)) > 0.0_dp
+         else
+            self%loaded(b, j) = maxval(pressure(first:last)) > 0.0_dp
+         end if
       end do
    end subroutine survey_row
+
+   !> The least value of a whole block. The loop has a fixed length, for which the compiler needs no rest.
+   pure function least_of_block(values) result(least)
+      real(dp), intent(in) :: values(width)
+      real(dp) :: least
+      integer :: i
+
+      least = values(1)
+      !$omp simd reduction(min:least)
+      do i = 1, width
+         least = min(least, values(i))
+      end do
+   end function least_of_block
+
+   !> The largest value of a whole block.
+   pure function most_of_block(values) result(most)
+      real(dp), intent(in) :: values(width)
+      real(dp) :: most
+      integer :: i
+
+      most = values(1)
+      !$omp simd reduction(max:most)
+      do i = 1, width
+         most = max(most, values(i))
+      end do
+   end function most_of_block
 
    !> List the runs of blocks that have a cell with P > 0 or a gap below the level. Set the work fields to zero in
    !> blocks that are no longer active.
