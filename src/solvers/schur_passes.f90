@@ -186,8 +186,7 @@ contains
                      self%residual(first, j), self%image(first:, j), self%search(first, j))
                else
                   call search_cells(n, real(om, sp), self%length, step%beta, added(first), &
-                     corrected(first), self%residual(first, j), self%response(first:, j), &
-                     self%image(first:, j), self%search(first, j))
+                     corrected(first), self%response(first:, j), self%image(first:, j), self%search(first, j))
                end if
             end associate
          end do
@@ -217,8 +216,8 @@ contains
                      self%search(first - 1, j), self%search(first, j + 1), self%response(first:, j), rows(j))
                else
                   call response_cells(n, self%weights, self%search(first, j - 1), &
-                     self%search(first - 1, j), self%search(first, j + 1), self%residual(first, j), &
-                     self%image(first:, j), self%response(first:, j), column(first), rows(j))
+                     self%search(first - 1, j), self%search(first, j + 1), self%image(first:, j), &
+                     self%response(first:, j), column(first), rows(j))
                end if
             end associate
          end do

@@ -25,6 +25,9 @@ module schur_sweeps
       real(dp) :: square = 0.0_dp           !! e^2 on N
    end type response_sums_type
 
+   ! The passes of a step take a cell as one of N if the search direction is not 0 there, so it must not be 0 on N.
+   real(sp), parameter :: least = tiny(1.0_sp)
+
 contains
 
    !> Compute image = K residual, with its sums on N.
@@ -74,18 +77,17 @@ contains
       do i = 1, n
          b = image(i) + coarse(i)
          image(i) = b
-         search(i) = off(residual(i))*(correction(i) - diagonal*b)
+         search(i) = off(residual(i))*(correction(i) - diagonal*b + least)
       end do
    end subroutine start_search_cells
 
    !> Add a later step to the image and form its search direction: image = image + length response + coarse part;
    !> search = correction - diagonal image + beta search on N.
-   pure subroutine search_cells(n, diagonal, length, beta, coarse, correction, residual, response, &
-      image, search)
+   pure subroutine search_cells(n, diagonal, length, beta, coarse, correction, response, image, search)
       integer, intent(in) :: n
       real(sp), intent(in) :: diagonal, length, beta
       real(sp), intent(in) :: coarse(n), correction(n)
-      real(sp), intent(in) :: residual(n), response(n)
+      real(sp), intent(in) :: response(n)
       real(sp), intent(inout) :: image(n)
       real(sp), intent(inout) :: search(n)
       real(sp) :: b
@@ -95,17 +97,16 @@ contains
       do i = 1, n
          b = image(i) + length*response(i) + coarse(i)
          image(i) = b
-         search(i) = off(residual(i))*(correction(i) - diagonal*b + beta*search(i))
+         search(i) = acts(search(i))*(correction(i) - diagonal*b + beta*search(i) + least)
       end do
    end subroutine search_cells
 
    !> Compute response = K search, with the sums on N.
-   pure subroutine response_cells(n, weights, south, search, north, residual, image, response, column, &
-      sums)
+   pure subroutine response_cells(n, weights, south, search, north, image, response, column, sums)
       integer, intent(in) :: n
       real(sp), intent(in) :: weights(3)
       real(sp), intent(in) :: south(n), search(0:n + 1), north(n)
-      real(sp), intent(in) :: residual(n), image(n)
+      real(sp), intent(in) :: image(n)
       real(sp), intent(inout) :: response(n)
       real(sp), intent(inout) :: column(n)          !! sums of the response on N over the rows of a block
       type(response_sums_type), intent(inout) :: sums
@@ -121,7 +122,7 @@ contains
       !$omp simd reduction(+:form, cross, square) private(e, f)
       do i = 1, n
          e = centre*search(i) - wx*(search(i - 1) + search(i + 1)) - wy*(south(i) + north(i))
-         f = off(residual(i))*e
+         f = acts(search(i))*e
          response(i) = e
          column(i) = column(i) + f
          form = form + search(i)*e
@@ -163,5 +164,13 @@ contains
 
       off = 0.5_sp - sign(0.5_sp, abs(residual) - tiny(1.0_sp))
    end function off
+
+   !> 1 on N, where the search direction is not 0, and 0 on S, without a branch.
+   elemental function acts(search)
+      real(sp), intent(in) :: search
+      real(sp) :: acts
+
+      acts = 0.5_sp + sign(0.5_sp, abs(search) - tiny(1.0_sp))
+   end function acts
 
 end module schur_sweeps
