@@ -268,21 +268,21 @@ contains
       integer, intent(in) :: distance
       logical, intent(in) :: periodic              !! the line is closed
       logical :: dilated(size(line))
-      integer :: b, k, turns, left, right, length
+      integer :: b, turn, left, right
 
       ! The blocks since the last one that is set, in both directions; a periodic line is passed twice.
       dilated = line
-      length = size(line)
-      turns = merge(2, 1, periodic)
       left = distance
       right = distance
-      do k = 1, turns*length
-         b = 1 + modulo(k - 1, length)
-         left = merge(0, left + 1, line(b))
-         if (left <= distance) dilated(b) = .true.
-         b = length + 1 - b
-         right = merge(0, right + 1, line(b))
-         if (right <= distance) dilated(b) = .true.
+      do turn = 1, merge(2, 1, periodic)
+         do b = 1, size(line)
+            left = merge(0, left + 1, line(b))
+            if (left <= distance) dilated(b) = .true.
+         end do
+         do b = size(line), 1, -1
+            right = merge(0, right + 1, line(b))
+            if (right <= distance) dilated(b) = .true.
+         end do
       end do
    end function dilated
 

@@ -26,6 +26,7 @@ module coarse_level
 
    public :: coarse_level_type, edge_rows, inner_rows, new_coarse_level
 
+   integer, parameter :: usual = int(block_cells)    !! cells of most blocks along a side
    real(dp), parameter :: many_blocks = 16384.0_dp   !! least number of blocks for which the level is divided
 
    !> The coarse level of a grid. A variable of this type must not be copied.
@@ -106,19 +107,31 @@ contains
       class(coarse_level_type), intent(in) :: self
       real(sp), intent(in) :: column(:)        !! sums over the rows of a row of blocks, [nx of the grid]
       real(dp), intent(out) :: blocks(:)       !! [nx]
-      integer :: b, i, first
-      real(dp) :: total
+      integer :: b, first
 
       first = 1
       do b = 1, self%nx
-         total = 0.0_dp
-         do i = first, self%last_x(b)
-            total = total + column(i)
-         end do
-         blocks(b) = total
+         if (self%last_x(b) - first + 1 == usual) then
+            blocks(b) = sum_of_block(column(first:self%last_x(b)))
+         else
+            blocks(b) = sum(real(column(first:self%last_x(b)), dp))
+         end if
          first = self%last_x(b) + 1
       end do
    end subroutine sum_blocks_single
+
+   !> The sum of a block of the usual size, for which the compiler needs no loop.
+   pure function sum_of_block(values) result(total)
+      real(sp), intent(in) :: values(usual)
+      real(dp) :: total
+      integer :: i
+
+      total = 0.0_dp
+      !$omp simd reduction(+:total)
+      do i = 1, usual
+         total = total + values(i)
+      end do
+   end function sum_of_block
 
    !> Form the sums over the blocks along x of values in double precision.
    pure subroutine sum_blocks_double(self, column, blocks)

@@ -8,10 +8,9 @@ module normal_passes
    use coarse_level, only : coarse_level_type, new_coarse_level
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
-   use normal_state, only : row_measure
    use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
-   use normal_sweeps, only : direction_cells, load_cells, overlap_cells, spread_cells
+   use normal_sweeps, only : direction_cells, load_cells, measure_cells, overlap_cells, spread_cells
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
@@ -70,7 +69,7 @@ contains
       !$omp parallel do default(none) shared(self, prescribed, pressure, gap) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%grid%rows()
-         self%state(j) = row_measure(pressure(:, j), gap(:, j), prescribed)
+         call measure_cells(self%grid%nx, prescribed, gap(1, j), pressure(1, j), self%state(j))
          call self%active%survey_row(.true., j, pressure(:, j), gap(:, j), self%state(j)%least)
       end do
    end subroutine survey

@@ -1,9 +1,11 @@
 !> The parts that all methods for normal contact share: the problem, the start, the gap, and the error measure.
 module normal_state
    use fft_conv, only : columns_apply, convolution_type
-   use field_sums, only : cell_count, field_mean, field_rms, largest_of_rows, least_of_rows, row_total
+   use field_sums, only : cell_count, field_mean, field_rms, largest_of_rows, least_of_rows, &
+      row_product, row_total
    use asperity_precision, only : dp, pi
    use normal_sums, only : state_sums_type, total
+   use normal_sweeps, only : count_cells_below, measure_cells
    use projection, only : project_simplex
    use solver_result, only : reason_converged, reason_iterations, reason_shape, reason_undetermined, reason_unmade, &
       solver_result_type
@@ -13,7 +15,7 @@ module normal_state
 
    public :: combine_measures, evaluate_gap, fault_of_problem, first_pressure, gap_measure_type, return_solution, &
       measure_gap, narrow_scale, normal_problem_type, prepare_problem, reason_converged, reason_iterations, &
-      reason_undetermined, remove_round_off, row_measure
+      reason_undetermined, remove_round_off
 
    integer, parameter, public :: control_pressure = 1   !! the mean pressure is prescribed
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
@@ -149,7 +151,7 @@ contains
          allocate (rows(size(height, 2)))
          !$omp parallel do default(none) shared(height, pressure, rows, task) private(j) num_threads(threads)
          do j = 1, size(height, 2)
-            rows(j) = dot_product(height(:, j) - task%datum, pressure(:, j))
+            rows(j) = row_product(height(:, j) - task%datum, pressure(:, j))
          end do
          displacement = row_total(rows)/measure%load + measure%weighted_level
       else if (task%control == control_approach) then
@@ -181,34 +183,6 @@ contains
       end do
       extent = [highest, lowest, total]
    end function row_extent
-
-   !> The sums of a row of a state, without its least gap.
-   function row_measure(pressure, gap, level) result(sums)
-      real(dp), intent(in) :: pressure(:), gap(:)
-      real(dp), intent(in) :: level                !! the prescribed one, m
-      type(state_sums_type) :: sums
-      real(dp) :: load, work, touched, cells, distance
-      integer :: i
-
-      load = 0.0_dp
-      work = 0.0_dp
-      touched = 0.0_dp
-      cells = 0.0_dp
-      distance = 0.0_dp
-      !$omp simd reduction(+:load, work, touched, cells, distance)
-      do i = 1, size(pressure)
-         load = load + pressure(i)
-         work = work + pressure(i)*gap(i)
-         distance = distance + pressure(i)*abs(gap(i) - level)
-         touched = touched + merge(gap(i), 0.0_dp, pressure(i) > 0.0_dp)
-         cells = cells + merge(1.0_dp, 0.0_dp, pressure(i) > 0.0_dp)
-      end do
-      sums%load = load
-      sums%work = work
-      sums%touched = touched
-      sums%cells = cells
-      sums%distance = distance
-   end function row_measure
 
    !> The measure of a state from its sums over the grid.
    pure function combine_measures(problem, cells, sums) result(measure)
@@ -253,7 +227,7 @@ contains
       !$omp parallel do default(none) shared(problem, pressure, gap, rows) private(j) &
       !$omp num_threads(threads)
       do j = 1, size(gap, 2)
-         rows(j) = row_measure(pressure(:, j), gap(:, j), problem%target)
+         call measure_cells(size(gap, 1), problem%target, gap(:, j), pressure(:, j), rows(j))
          rows(j)%least = minval(gap(:, j))
       end do
       measure = combine_measures(problem, cell_count(gap), total(rows))
@@ -384,7 +358,7 @@ contains
       least = round_off*measure%load/max(measure%contact*cells, 1.0_dp)
       !$omp parallel do default(none) shared(pressure, gap, measure, least) private(i, j) num_threads(threads)
       do j = 1, size(pressure, 2)
-         if (.not. any(pressure(:, j) > 0.0_dp .and. pressure(:, j) <= least)) cycle
+         if (count_cells_below(size(pressure, 1), least, pressure(:, j)) < 1.0_dp) cycle
          do i = 1, size(pressure, 1)
             if (pressure(i, j) <= least .and. gap(i, j) > measure%weighted_level) pressure(i, j) = 0.0_dp
          end do

@@ -12,8 +12,8 @@ module normal_sweeps
    implicit none
    private
 
-   public :: above_cells, changed_trial_cells, clip_cells, direction_cells, load_cells, longest_cells, &
-      overlap_cells, residual_cells, spread_cells, trial_cells
+   public :: above_cells, changed_trial_cells, clip_cells, count_cells_below, direction_cells, load_cells, &
+      longest_cells, measure_cells, overlap_cells, residual_cells, spread_cells, trial_cells
 
 contains
 
@@ -293,5 +293,50 @@ contains
       sums%cells = sums%cells + cells
       sums%distance = sums%distance + distance
    end subroutine load_cells
+
+   !> Form the sums of a state without its least gap.
+   pure subroutine measure_cells(n, target, gap, pressure, sums)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: target                !! prescribed level
+      real(dp), intent(in) :: gap(n), pressure(n)
+      type(state_sums_type), intent(out) :: sums
+      real(dp) :: load, work, touched, cells, distance, inside
+      integer :: i
+
+      load = 0.0_dp
+      work = 0.0_dp
+      touched = 0.0_dp
+      cells = 0.0_dp
+      distance = 0.0_dp
+      !$omp simd reduction(+:load, work, touched, cells, distance) private(inside)
+      do i = 1, n
+         load = load + pressure(i)
+         work = work + pressure(i)*gap(i)
+         distance = distance + pressure(i)*abs(gap(i) - target)
+         inside = positive(pressure(i))
+         touched = touched + inside*gap(i)
+         cells = cells + inside
+      end do
+      sums%load = load
+      sums%work = work
+      sums%touched = touched
+      sums%cells = cells
+      sums%distance = distance
+   end subroutine measure_cells
+
+   !> Count the cells whose pressure is positive, and not above a limit.
+   pure function count_cells_below(n, limit, pressure) result(cells)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: limit
+      real(dp), intent(in) :: pressure(n)
+      real(dp) :: cells
+      integer :: i
+
+      cells = 0.0_dp
+      !$omp simd reduction(+:cells)
+      do i = 1, n
+         cells = cells + positive(pressure(i))*(1.0_dp - positive(pressure(i) - limit))
+      end do
+   end function count_cells_below
 
 end module normal_sweeps

@@ -153,14 +153,14 @@ contains
    !> Prepare W for a set N. Collective.
    subroutine set_weights(self, cells_off, mean_stiffness)
       class(schur_coarse_type), intent(inout) :: self
-      real(dp), intent(in) :: cells_off(:, :)          !! numbers of cells of N in the blocks
+      real(dp), intent(in) :: cells_off(:, :)          !! numbers of cells of N in the blocks, whole
       real(dp), intent(in) :: mean_stiffness           !! that B has for the mean in addition
       real(dp) :: taken, shift, all_off(1)
       integer :: i, j
 
       !$omp parallel do default(none) shared(self, cells_off) private(j) num_threads(self%threads)
       do j = 1, size(cells_off, 2)
-         self%weight(:, j) = self%powers(nint(cells_off(:, j)))
+         self%weight(:, j) = self%powers(int(cells_off(:, j)))
       end do
       ! The shift is rounded, so that the symbol seldom has to be computed again. Numbers of cells are added
       ! without error.
