@@ -24,6 +24,13 @@ module coarse_fields
       procedure :: take
    end type row_means_type
 
+   !> Where the centre of a cell lies between the centres of the coarse cells along a side.
+   type :: place_type
+      integer :: beside(4) = 0                     !! two coarse cells before the centre, and two after it
+      real(dp) :: weights(4) = 0.0_dp              !! of their values: linear, or of a cubic polynomial for a pressure
+      logical :: first_half = .true.               !! the second coarse cell is the nearest one
+   end type place_type
+
 contains
 
    !> A grid over the same lengths with about a quarter of the cells along each side, as many as are cheap to
@@ -202,70 +209,71 @@ contains
       integer, intent(in) :: threads
       logical, intent(in) :: is_pressure
       real(dp), intent(out) :: field(:, :)         !! [fine%nx, fine%rows()]
-      real(dp), allocatable :: rows(:, :), between(:), parts(:)
-      integer, allocatable :: beside(:, :)
-      real(dp) :: part
-      integer :: range(2), j, below
+      real(dp), allocatable :: rows(:, :), between(:)
+      type(place_type), allocatable :: along_x(:)
+      type(place_type) :: place
+      integer :: range(2), i, j
 
       range = [1, 0]
       if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
          below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
-      allocate (rows(coarse%nx, range(2) - range(1) + 1))
+      allocate (rows(coarse%nx, range(1):range(2)))
       call fetch_rows(coarse, values, range, rows)
-      call places_along_row(coarse, fine%nx, beside, parts)
+      along_x = [(place_of_cell(coarse%nx, fine%nx, i, is_pressure), i=1, fine%nx)]
+      do i = 1, fine%nx
+         along_x(i)%beside = coarse%column_at(along_x(i)%beside)
+      end do
 
-      !$omp parallel default(none) shared(coarse, fine, rows, range, is_pressure, field, beside, parts) &
-      !$omp private(j, below, part, between) num_threads(threads)
+      !$omp parallel default(none) shared(coarse, fine, rows, is_pressure, field, along_x) &
+      !$omp private(i, j, place, between) num_threads(threads)
       allocate (between(0:coarse%nx), source=0.0_dp)
       !$omp do
       do j = 1, fine%rows()
-         associate (row => fine%first_row - 1 + j)
-            below = below_centre(fine%ny, coarse%ny, row) - range(1) + 1
-            part = part_above(fine%ny, coarse%ny, row)
-         end associate
-         between(1:) = interpolate(is_pressure, part, rows(:, below - 1), rows(:, below), rows(:, below + 1), &
-            rows(:, below + 2))
-         field(:, j) = interpolate(is_pressure, parts, between(beside(1, :)), between(beside(2, :)), &
-            between(beside(3, :)), between(beside(4, :)))
+         place = place_of_cell(coarse%ny, fine%ny, fine%first_row - 1 + j, is_pressure)
+         do i = 1, coarse%nx
+            between(i) = interpolate(place, is_pressure, rows(i, place%beside(1)), rows(i, place%beside(2)), &
+               rows(i, place%beside(3)), rows(i, place%beside(4)))
+         end do
+         do i = 1, fine%nx
+            associate (at => along_x(i)%beside)
+               field(i, j) = interpolate(along_x(i), is_pressure, between(at(1)), between(at(2)), between(at(3)), &
+                  between(at(4)))
+            end associate
+         end do
       end do
       !$omp end parallel
    end subroutine refine
 
-   !> Find the four coarse cells beside the centre of each cell of a row, 0 for those outside a free grid, and how far the
-   !> centre lies from the second towards the third.
-   subroutine places_along_row(coarse, cells, beside, parts)
-      type(grid_type), intent(in) :: coarse
-      integer, intent(in) :: cells                 !! of the row
-      integer, allocatable, intent(out) :: beside(:, :)   !! [4, cells]
-      real(dp), allocatable, intent(out) :: parts(:)      !! [cells]
-      integer :: i, k
-
-      allocate (beside(4, cells), parts(cells))
-      do i = 1, cells
-         beside(:, i) = coarse%column_at(below_centre(cells, coarse%nx, i) + [(k, k=-1, 2)])
-         parts(i) = part_above(cells, coarse%nx, i)
-      end do
-   end subroutine places_along_row
-
-   !> Interpolate between the middle two of four equidistant values: linearly, or a pressure by the cubic polynomial
-   !> through all four. A pressure is 0 where the nearest one is 0, and positive elsewhere.
-   elemental function interpolate(is_pressure, part, before, below, above, beyond) result(value)
+   !> The place of the centre of cell k of n between those of the coarse cells along a side.
+   pure function place_of_cell(coarse, n, k, is_pressure) result(place)
+      integer, intent(in) :: coarse, n, k
       logical, intent(in) :: is_pressure
-      real(dp), intent(in) :: part                 !! of the way from the second value to the third, 0 to 1
+      type(place_type) :: place
+      real(dp) :: t, curved
+      integer :: i
+
+      place%beside = below_centre(n, coarse, k) + [(i, i=-1, 2)]
+      t = part_above(n, coarse, k)
+      place%first_half = t < 0.5_dp
+      place%weights = [0.0_dp, 1.0_dp - t, t, 0.0_dp]
+      if (.not. is_pressure) return
+      curved = t*(1.0_dp - t)/6.0_dp
+      place%weights = place%weights - curved*((2.0_dp - t)*[1.0_dp, -2.0_dp, 1.0_dp, 0.0_dp] &
+         + (1.0_dp + t)*[0.0_dp, 1.0_dp, -2.0_dp, 1.0_dp])
+   end function place_of_cell
+
+   !> Interpolate between four equidistant values. A pressure is 0 where the nearest one is 0, and positive elsewhere.
+   pure function interpolate(place, is_pressure, before, below, above, beyond) result(value)
+      type(place_type), intent(in) :: place
+      logical, intent(in) :: is_pressure
       real(dp), intent(in) :: before, below, above, beyond
       real(dp) :: value
       real(dp) :: nearest
 
-      value = (1.0_dp - part)*below + part*above
+      value = (place%weights(1)*before + place%weights(4)*beyond) + (place%weights(2)*below + place%weights(3)*above)
       if (.not. is_pressure) return
-      nearest = merge(below, above, part < 0.5_dp)
-      if (nearest <= 0.0_dp) then
-         value = 0.0_dp
-         return
-      end if
-      value = value - part*(1.0_dp - part)*((2.0_dp - part)*(before - 2.0_dp*below + above) &
-         + (1.0_dp + part)*(below - 2.0_dp*above + beyond))/6.0_dp
-      value = max(value, least_part*nearest)
+      nearest = merge(below, above, place%first_half)
+      value = merge(max(value, least_part*nearest), 0.0_dp, nearest > 0.0_dp)
    end function interpolate
 
    !> The last coarse cell whose centre does not lie beyond that of cell k of n; 0 before the first centre.
