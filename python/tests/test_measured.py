@@ -849,6 +849,22 @@ def test_files_that_cannot_be_read(tmp_path):
         import_topography(tmp_path / "whole.x3p", tmp_path / "half.x3p")
 
 
+def test_the_map_of_another_topography_is_not_replaced(tmp_path):
+    topography(sample()).to_x3p(str(tmp_path / "one.x3p"))
+    topography(2 * sample()).to_x3p(str(tmp_path / "two.x3p"))
+    output = tmp_path / "s.h5"
+    import_topography(tmp_path / "one.x3p", output)
+    import_topography(tmp_path / "one.x3p", output, level="tilt")
+    before = output.read_bytes()
+    words = r"s\.h5: is the map of another topography, one\.x3p: --overwrite .* replaces it"
+    with pytest.raises(FileExistsError, match=words):
+        import_topography(tmp_path / "two.x3p", output)
+    assert main(["import", str(tmp_path / "two.x3p"), "-o", str(output)]) == 3
+    assert output.read_bytes() == before
+    assert main(["import", str(tmp_path / "two.x3p"), "-o", str(output), "--overwrite"]) == 0
+    assert import_topography(tmp_path / "two.x3p", output).source["name"] == "two.x3p"
+
+
 def command(*words, folder=None):
     """Run ``python -m asperity``."""
     return subprocess.run([sys.executable, "-m", "asperity", *map(str, words)], cwd=folder,

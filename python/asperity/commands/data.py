@@ -33,6 +33,9 @@ def add_import(verbs: Any) -> None:
                         help="file of an instrument")
     parser.add_argument("-o", "--output", metavar="FILE.h5", type=Path, default=Path("surface.h5"),
                         help="file to write (default: surface.h5)")
+    parser.add_argument("--overwrite", action="store_true",
+                        help="replace the map of another topography; without this option only a map"
+                             " of the same topography is replaced")
     parser.add_argument("--list", action="store_true",
                         help="list the channels of the file and write nothing")
     parser.add_argument("--channel", metavar="NAME|N",
@@ -72,11 +75,11 @@ def _import(chosen: argparse.Namespace) -> int:
         print("\n".join(channels(chosen.topography)))
         return 0
     surface = import_topography(
-        chosen.topography, chosen.output, channel=chosen.channel, unit=chosen.unit,
-        size=chosen.size, transpose=chosen.transpose, crop=chosen.crop, level=chosen.level,
-        max_missing=chosen.max_missing, invert=chosen.invert, scale=chosen.scale,
-        resample=chosen.resample, periodic=chosen.periodic, taper=chosen.taper,
-        restore_rms=chosen.restore_rms)
+        chosen.topography, chosen.output, overwrite=chosen.overwrite, channel=chosen.channel,
+        unit=chosen.unit, size=chosen.size, transpose=chosen.transpose, crop=chosen.crop,
+        level=chosen.level, max_missing=chosen.max_missing, invert=chosen.invert,
+        scale=chosen.scale, resample=chosen.resample, periodic=chosen.periodic,
+        taper=chosen.taper, restore_rms=chosen.restore_rms)
     print(f"wrote {chosen.output}")
     print(surface.summary())
     print()

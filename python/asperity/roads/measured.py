@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, number
+from ..base.files import MAP, check_output
 from ..base.presenters import present
 from .instrument_files import UNITS, channels, read_map, to_metres
 from .map_work import MapWork, fit_terms, polynomial
@@ -310,7 +311,7 @@ def _check_window(periodic: str | None, taper: float | None, restore_rms: bool) 
 
 
 def import_topography(
-    path: str | Path, output: str | Path = "surface.h5", **options: Any
+    path: str | Path, output: str | Path = "surface.h5", overwrite: bool = False, **options: Any
 ) -> MeasuredSurface:
     """Read a measured topography and write the height map for a run.
 
@@ -319,7 +320,9 @@ def import_topography(
     path : str or Path
         The file of an instrument.
     output : str or Path
-        HDF5 file to write. An existing map is replaced.
+        HDF5 file to write. An existing map of the same topography is replaced.
+    overwrite : bool
+        Replace the map of another topography, too.
     **options
         Options of `load`.
 
@@ -330,14 +333,34 @@ def import_topography(
 
     Raises
     ------
+    FileExistsError
+        If the output is the map of another topography, and `overwrite` is not given.
     OSError, ValueError, ImportError
         As in `load` and `MeasuredSurface.save`.
     """
     surface = load(path, **options)
     if Path(output).exists() and Path(output).samefile(path):
         raise ValueError(f"output = {str(output)!r}: is the topography itself")
+    if not overwrite:
+        _check_same_topography(Path(output), surface)
     surface.save(output)
     return surface
+
+
+def _check_same_topography(output: Path, surface: MeasuredSurface) -> None:
+    """Refuse to replace the map of another topography."""
+    import h5py
+
+    check_output(output, MAP)
+    if not output.is_file() or output.stat().st_size == 0:
+        return
+    with h5py.File(output) as file:
+        name = str(file.attrs.get("source_name", "of an unknown file"))
+        checksum = str(file.attrs.get("source_sha256", ""))
+    if checksum != surface.source.get("sha256"):
+        raise FileExistsError(
+            f"{output}: is the map of another topography, {name}: --overwrite (overwrite=True)"
+            " replaces it, or choose another --output")
 
 
 def step_in_words(step: dict[str, Any]) -> str:
