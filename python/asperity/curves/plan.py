@@ -202,13 +202,15 @@ class CurvePlan:
         road, patch = self.road, self.road.patch(0)
         ny, nx = patch.height.shape
         band = road.whole_spectrum.band
-        kept = f"{min(_longest(self), band[0]):.4g} to {road.short:.4g} m"
+        # The spectrum of a map lacks the waves of which the map holds few, but its patches do not.
+        longest = max(max(lx, ly) for *_, lx, ly in road.maps) if road.is_measured else band[0]
+        kept = f"{min(_longest(self), longest):.4g} to {road.short:.4g} m"
         heights = statistics(patch.height, patch.lx, patch.ly)
         lines = [
             f"road       {road.name}: {counted(self.patches, 'patch', 'patches')} of"
             f" {nx} x {ny} cells, {patch.lx:.4g} x {patch.ly:.4g} m"
             + ("" if road.join == "none" else f", made periodic by {road.join!r}"),
-            f"waves      {kept} are kept of {band[0]:.4g} to"
+            f"waves      {kept} are kept of {longest:.4g} to"
             f" {min(band[1], road.short):.4g} m",
             f"heights    rms {heights.rms_height:.4g} m, rms slope {heights.rms_slope:.4g}"
             f" ({patch.label})",
