@@ -25,9 +25,6 @@ module schur_sweeps
       real(dp) :: square = 0.0_dp           !! e^2 on N
    end type response_sums_type
 
-   ! The passes of a step take a cell as one of N if the search direction is not 0 there, so it must not be 0 on N.
-   real(sp), parameter :: least = tiny(1.0_sp)
-
 contains
 
    !> Compute image = K residual, with its sums on N.
@@ -77,7 +74,7 @@ contains
       do i = 1, n
          b = image(i) + coarse(i)
          image(i) = b
-         search(i) = off(residual(i))*(correction(i) - diagonal*b + least)
+         search(i) = off(residual(i))*not_zero(correction(i) - diagonal*b)
       end do
    end subroutine start_search_cells
 
@@ -97,7 +94,7 @@ contains
       do i = 1, n
          b = image(i) + length*response(i) + coarse(i)
          image(i) = b
-         search(i) = acts(search(i))*(correction(i) - diagonal*b + beta*search(i) + least)
+         search(i) = acts(search(i))*not_zero(correction(i) - diagonal*b + beta*search(i))
       end do
    end subroutine search_cells
 
@@ -164,6 +161,15 @@ contains
 
       off = 0.5_sp - sign(0.5_sp, abs(residual) - tiny(1.0_sp))
    end function off
+
+   !> A value of the search direction on N, changed as little as possible if it is 0 or nearly 0: the passes take a cell as
+   !> one of N if its search direction is not 0.
+   elemental function not_zero(value)
+      real(sp), intent(in) :: value
+      real(sp) :: not_zero
+
+      not_zero = sign(max(abs(value), tiny(1.0_sp)), value)
+   end function not_zero
 
    !> 1 on N, where the search direction is not 0, and 0 on S, without a branch.
    elemental function acts(search)
