@@ -37,6 +37,7 @@ contains
          call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp, mean_stiffness=4.0_dp)
          call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
       end if
+      if (selected('search_reaches_cells_far_from_a_small_contact')) call search_reaches_cells_far_from_a_small_contact()
       if (selected('a_given_approach_makes_only_the_mean_stiff')) call a_given_approach_makes_only_the_mean_stiff()
       if (selected('released_cells_change_the_direction')) then
          call released_cells_change_the_direction(boundary_periodic, 24, 16, 1.0_dp)
@@ -131,6 +132,30 @@ contains
       call s%preconditioner%destroy()
       call s%coarse%destroy()
    end subroutine preconditioner_is_the_schur_complement
+
+   !> The residual of a small contact on a line has no part on the coarse level. Far from it the search direction is exactly
+   !> 0 in the first steps, but these cells belong to N and have to be reached by the next ones.
+   subroutine search_reaches_cells_far_from_a_small_contact()
+      integer, parameter :: n = 17, on(2) = [5, 6]
+      type(setting_type), target :: s
+      real(dp), allocatable :: b(:, :)
+      real(dp) :: r(n), z(n), exact(2), form
+      logical :: inside(n)
+      integer, allocatable :: off(:)
+      integer :: i
+
+      call new_setting(s, new_grid(n, 1, 1.0_dp, 1.0_dp/n, boundary_periodic), b)
+      inside = [(any(on == i), i=1, n)]
+      r = 0.0_dp
+      r(on) = [1.0_dp, -1.0_dp]
+      off = pack([(i, i=1, n)], .not. inside)
+      exact = matmul(b(on, on), r(on)) - matmul(b(on, off), solved(b(off, off), matmul(b(off, on), r(on))))
+      call apply(s, r, inside, 20, z, form)
+      call check_order(norm2(z(on) - exact), '<=', 1e-3_dp*norm2(exact), 'the Schur complement of two cells')
+      call check_close(form, dot_product(r(on), exact), 1e-4_dp*form, 'and its energy')
+      call s%preconditioner%destroy()
+      call s%coarse%destroy()
+   end subroutine search_reaches_cells_far_from_a_small_contact
 
    !> At a given approach the model gives the mean the stiffness 2/(part of open cells), and all else stays as it is.
    subroutine a_given_approach_makes_only_the_mean_stiff()
