@@ -1,9 +1,10 @@
 !> The innermost loops of module `schur_preconditioner` over neighbouring cells of one row, in single
 !> precision.
 !>
-!> Each is one loop without branches, so that it runs in vector registers. A cell is in the contact set
-!> S if its residual is not 0; the others form the set N. The loops take many arguments because passing
-!> them costs less than looking them up in records.
+!> Each is one loop without branches, so that it runs in vector registers. A cell is in the contact set S
+!> if its residual is not 0; the others form the set N. From the first step on, the search direction is 0 on
+!> S and not 0 on N: the later steps tell the sets by it and need not read the residual. The loops take many
+!> arguments because passing them costs less than looking them up in records.
 module schur_sweeps
    use asperity_precision, only : dp, sp
    implicit none
@@ -74,7 +75,7 @@ contains
       do i = 1, n
          b = image(i) + coarse(i)
          image(i) = b
-         search(i) = off(residual(i))*not_zero(correction(i) - diagonal*b)
+         search(i) = off(residual(i))*away_from_zero(correction(i) - diagonal*b)
       end do
    end subroutine start_search_cells
 
@@ -94,7 +95,7 @@ contains
       do i = 1, n
          b = image(i) + length*response(i) + coarse(i)
          image(i) = b
-         search(i) = acts(search(i))*not_zero(correction(i) - diagonal*b + beta*search(i))
+         search(i) = acts(search(i))*away_from_zero(correction(i) - diagonal*b + beta*search(i))
       end do
    end subroutine search_cells
 
@@ -154,29 +155,28 @@ contains
       sums%form = sums%form + form
    end subroutine last_response_cells
 
-   !> 1 on N, where the residual is 0, and 0 on S, without a branch.
+   !> 1 on N, where the residual is 0, and 0 on S.
    elemental function off(residual)
       real(sp), intent(in) :: residual
       real(sp) :: off
 
-      off = 0.5_sp - sign(0.5_sp, abs(residual) - tiny(1.0_sp))
+      off = 1.0_sp - acts(residual)
    end function off
 
-   !> A value of the search direction on N, changed as little as possible if it is 0 or nearly 0: the passes take a cell as
-   !> one of N if its search direction is not 0.
-   elemental function not_zero(value)
+   !> 1 where a value is not 0, and 0 elsewhere, without a branch.
+   elemental function acts(value)
       real(sp), intent(in) :: value
-      real(sp) :: not_zero
-
-      not_zero = sign(max(abs(value), tiny(1.0_sp)), value)
-   end function not_zero
-
-   !> 1 on N, where the search direction is not 0, and 0 on S, without a branch.
-   elemental function acts(search)
-      real(sp), intent(in) :: search
       real(sp) :: acts
 
-      acts = 0.5_sp + sign(0.5_sp, abs(search) - tiny(1.0_sp))
+      acts = 0.5_sp + sign(0.5_sp, abs(value) - tiny(1.0_sp))
    end function acts
+
+   !> A value that is not 0, and else the given one: the search direction must not be 0 on N.
+   elemental function away_from_zero(value)
+      real(sp), intent(in) :: value
+      real(sp) :: away_from_zero
+
+      away_from_zero = sign(max(abs(value), tiny(1.0_sp)), value)
+   end function away_from_zero
 
 end module schur_sweeps
