@@ -79,18 +79,16 @@ contains
    end subroutine new_active_blocks
 
    !> Deactivate all blocks, and set the work fields to zero.
-   subroutine clear(self, residual, direction, search, step)
+   subroutine clear(self, residual, direction, search)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), without its border
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
       real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
-      real(dp), intent(inout) :: step(:, :)        !! [nx, rows]
       integer :: j
 
-      !$omp parallel do default(none) shared(self, residual, direction, search, step) private(j) &
+      !$omp parallel do default(none) shared(self, residual, direction, search) private(j) &
       !$omp num_threads(self%threads)
       do j = 1, self%rows
-         step(:, j) = 0.0_dp
          residual(:, j) = 0.0_sp
          direction(:, j) = 0.0_sp
          search(:, j) = 0.0_sp
@@ -157,16 +155,15 @@ contains
 
    !> List the runs of blocks that have a cell with P > 0 or a gap below the level. Set the work fields to zero in
    !> blocks that are no longer active.
-   subroutine list_runs(self, level, residual, direction, step)
+   subroutine list_runs(self, level, residual, direction)
       class(active_blocks_type), intent(inout) :: self
       real(dp), intent(in) :: level                !! m
       real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1)
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
-      real(dp), intent(inout) :: step(:, :)        !! [nx, rows]
       integer :: b, j, first, last, n
       logical :: now, before
 
-      !$omp parallel do default(none) shared(self, level, residual, direction, step) &
+      !$omp parallel do default(none) shared(self, level, residual, direction) &
       !$omp private(b, j, first, last, n, now, before) num_threads(self%threads)
       do j = 1, self%rows
          n = 0
@@ -184,7 +181,6 @@ contains
             else if (self%live(b, j)) then
                residual(first:last, j) = 0.0_sp
                direction(first:last, j) = 0.0_sp
-               step(first:last, j) = 0.0_dp
             end if
             self%live(b, j) = now
             before = now

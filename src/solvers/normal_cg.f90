@@ -34,8 +34,8 @@
 !> is computed again from the pressure in double precision, which always precedes the end of a solve in mixed
 !> precision, and when single precision is no longer useful.
 !>
-!> Memory, in fields of doubles: 7.1 in periodic mode. These are H, P, gap and step; three fields in single precision
-!> (the direction, the residual and the search direction of the preconditioner); the operator's spectrum, whose memory
+!> Memory, in fields of doubles: 6.6 in periodic mode. These are H, P and gap; four fields in single precision (the
+!> direction, and of the preconditioner the residual, that before, and the search direction); the operator's spectrum, whose memory
 !> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
 !> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
 !> mode spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more
@@ -83,7 +83,6 @@ module normal_cg
       real(dp) :: replace_start_from = 5e5_dp         !! the same for a solve with a start that is far away
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
-      real(dp), allocatable, private :: step(:, :)    !! s, Pa [nx, rows]; first the trial pressure
    contains
       procedure :: solve
       procedure, private :: start_on_coarse_grid, solve_roughly
@@ -102,7 +101,6 @@ contains
 
       self%grid = grid
       if (present(mixed)) self%mixed = mixed
-      allocate (self%step(grid%nx, grid%rows()), source=0.0_dp)
       call check_normal_kernel(kernel, error)
       call new_convolution(self%operator, grid, kernel, error, lean=self%mixed)
       if (self%mixed) call new_convolution(self%quick, grid, kernel, error, single=.true., &
@@ -138,11 +136,10 @@ contains
          outcome%stopped = stop_is_due()
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
-         call choose_direction(self%work, task, measure, pressure, gap, self%step, now)
-         call choose_step(self%work, product, task, measure%level, pressure, gap, self%step, now)
+         call choose_direction(self%work, task, measure, pressure, gap, now)
+         call choose_step(self%work, product, task, measure%level, pressure, gap, now)
          if (now%alpha > 0.0_dp) then
-            call update_state(self%work, product, task%target, now%alpha/task%modulus, now%alpha, &
-               self%step, pressure, gap)
+            call update_state(self%work, product, task%target, now%alpha, task%modulus, pressure, gap)
             call watch%note_step()
          end if
       end do
@@ -159,7 +156,7 @@ contains
          effort = 0.0_dp
          if (determined) call self%start_on_coarse_grid(task, height, pressure, effort, past)
          call self%work%active%clear(self%work%preconditioner%residual, self%work%direction, &
-            self%work%preconditioner%search, self%step)
+            self%work%preconditioner%search)
          self%work%scale = 0.0_dp
          self%work%offset = 0.0_dp
          call new_gap_watch(watch, self%mixed, task%tolerance)
@@ -198,7 +195,7 @@ contains
          if (outcome%iterations >= problem%max_iterations) now%phase = phase_ended
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
-            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction, self%step)
+            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction)
             call work%active%list_wide_runs(work%preconditioner%search, far=far_rim_pays(cells))
          end associate
       end subroutine measure_state

@@ -25,12 +25,12 @@
 module normal_iteration
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
-   use normal_passes, only : mean_stiffness, new_direction, normal_work_type, overlap_with, predict_form
-   use normal_projection, only : clip_step, clip_type, find_clip, keep_block_sums, longest_multiple, try_pressure
+   use normal_passes, only : mean_stiffness, new_direction, normal_work_type, overlap_with_before, predict_form
+   use normal_projection, only : find_clip, keep_block_sums, longest_multiple, project_step, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type
+   use normal_sweeps, only : trial_type
    use regular_grid, only : boundary_periodic, grid_type
-   use schur_release, only : trial_type
    implicit none
    private
 
@@ -116,12 +116,11 @@ contains
    end function size_class
 
    !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
-   subroutine choose_direction(work, task, measure, pressure, gap, before, now)
+   subroutine choose_direction(work, task, measure, pressure, gap, now)
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
       type(gap_measure_type), intent(in) :: measure
       real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
-      real(dp), contiguous, intent(inout) :: before(:, :)  !! work field, for the residual before
       type(iteration_type), intent(inout) :: now
       real(dp) :: rz, beta, stiffness
       integer :: steps
@@ -132,15 +131,14 @@ contains
       stiffness = 0.0_dp
       if (now%free_mean) stiffness = mean_stiffness(work, 1.0_dp - measure%contact, pressure)
       call work%preconditioner%blocks%stiffen_mean(stiffness)
-      call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, &
-         pressure, gap, before)
+      call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
       work%preconditioner%waves%fixed_load = fixed_load
       now%releases = model_fits(work)
       now%class = size_class(work%grid, measure%contact)
       steps = merge(steps_before(now%class), steps_alone(now%class), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
       beta = 0.0_dp
-      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, before, rz, now%rz)
+      if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, rz, now%rz)
       now%rz = rz
       now%slope = 0.0_dp
       now%preconditioned = now%phase /= phase_plain
@@ -163,9 +161,8 @@ contains
    !> the conjugacy of the directions, it never recovers: each direction then consists mostly of the old ones, and r.z
    !> falls by a half instead of a tenth in each iteration. What r.z contains of the residual before is therefore left
    !> out (Polak and Ribiere's beta) where beta is so large.
-   function conjugacy_factor(work, before, rz, rz_before) result(beta)
+   function conjugacy_factor(work, rz, rz_before) result(beta)
       type(normal_work_type), intent(in) :: work
-      real(dp), contiguous, intent(in) :: before(:, :)
       real(dp), intent(in) :: rz, rz_before
       real(dp) :: beta
       real(dp) :: overlap
@@ -174,26 +171,24 @@ contains
       if (work%preconditioner%by_waves) then
          overlap = work%preconditioner%overlap
       else if (rz > suspicious*rz_before) then
-         overlap = max(overlap_with(work, before), 0.0_dp)
+         overlap = max(overlap_with_before(work), 0.0_dp)
       end if
       beta = max(rz - overlap, 0.0_dp)/rz_before
    end function conjugacy_factor
 
    !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
    !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
-   subroutine choose_step(work, product, task, level, pressure, gap, step, now)
+   subroutine choose_step(work, product, task, level, pressure, gap, now)
       type(normal_work_type), intent(inout) :: work
       type(convolution_type), intent(inout) :: product
       type(normal_problem_type), intent(in) :: task
       real(dp), intent(in) :: level                    !! m
       real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
-      real(dp), contiguous, intent(inout) :: step(:, :)  !! s, Pa
       type(iteration_type), intent(inout) :: now
       type(trial_sums_type) :: trial
       type(step_sums_type) :: sums
-      type(clip_type) :: clip
       real(dp) :: alpha
-      logical :: fixed_load
+      logical :: fixed_load, clipped
 
       now%alpha = 0.0_dp
       if (now%phase == phase_ended) return
@@ -201,18 +196,17 @@ contains
       alpha = trial_length(work, task%modulus, now)
       if (is_releasing(now)) call work%preconditioner%release(work%coarse, work%active, &
          steps_after(now%class), trial_type(alpha, work%offset), pressure, work%direction)
-      call try_pressure(work, alpha, pressure, step, trial)
+      call try_pressure(work, alpha, pressure, trial)
       if (trial%cells < 1.0_dp .and. fixed_load) then
          call shorten(now)
          return
       end if
-      if (work%preconditioner%by_waves .and. now%preconditioned) &
-         call keep_block_sums(work, step, trial)
-      call find_clip(work, fixed_load, task%target*work%grid%cells(), step, trial, clip)
-      if (work%preconditioner%released) work%offset = work%offset + clip%shift/alpha
-      call clip_step(work, product, clip, level, pressure, gap, step, sums)
+      if (work%preconditioner%by_waves .and. now%preconditioned) call keep_block_sums(work, pressure, trial)
+      call find_clip(work, fixed_load, task%target*work%grid%cells(), pressure, trial, clipped)
+      if (work%preconditioner%released) work%offset = work%offset + work%trial%shift/alpha
+      call project_step(work, product, level, pressure, gap, sums)
       if (sums%slope > 0.0_dp) then
-         call choose_length(work, product, task%modulus, pressure, step, clip%clipped, sums, now)
+         call choose_length(work, product, task%modulus, pressure, clipped, sums, now)
       else
          call shorten(now)
       end if
@@ -262,11 +256,11 @@ contains
    end subroutine shorten
 
    !> Compute the part of the projected step that is taken, from the product of the operator with it.
-   subroutine choose_length(work, product, modulus, pressure, step, clipped, sums, now)
+   subroutine choose_length(work, product, modulus, pressure, clipped, sums, now)
       type(normal_work_type), intent(inout) :: work
       type(convolution_type), intent(inout) :: product
       real(dp), intent(in) :: modulus                  !! Pa
-      real(dp), contiguous, intent(in) :: pressure(:, :), step(:, :)
+      real(dp), contiguous, intent(in) :: pressure(:, :)
       logical, intent(in) :: clipped
       type(step_sums_type), intent(in) :: sums         !! of the step
       type(iteration_type), intent(inout) :: now
@@ -304,7 +298,7 @@ contains
       if (clipped .and. now%alpha > least_for_whole) then
          now%alpha = 1.0_dp
       else if (now%alpha > 1.0_dp) then
-         now%alpha = min(now%alpha, longest_multiple(work, pressure, step))
+         now%alpha = min(now%alpha, longest_multiple(work, pressure))
       end if
    end subroutine choose_length
 

@@ -10,14 +10,14 @@ module normal_passes
    use fft_conv, only : convolution_type
    use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
-   use normal_sweeps, only : direction_cells, load_cells, measure_cells, overlap_cells, spread_cells
+   use normal_sweeps, only : direction_cells, load_cells, measure_cells, overlap_cells, spread_cells, trial_type
    use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private
 
-   public :: mean_stiffness, new_direction, new_normal_work, normal_work_type, overlap_with, predict_form, survey, &
+   public :: mean_stiffness, new_direction, new_normal_work, normal_work_type, overlap_with_before, predict_form, survey, &
       update_state
 
    !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
@@ -36,6 +36,7 @@ module normal_passes
       real(dp) :: scale = 0.0_dp                     !! of the residual and the direction; 0: not chosen yet
       real(sp), allocatable :: direction(:, :)       !! [nx, rows]
       real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
+      type(trial_type) :: trial                      !! the step along the direction
       type(state_sums_type), allocatable :: state(:)   !! of each row of the present state
    end type normal_work_type
 
@@ -75,9 +76,8 @@ contains
    end subroutine survey
 
    !> The product of z = M r with the residual before.
-   function overlap_with(self, before) result(overlap)
+   function overlap_with_before(self) result(overlap)
       type(normal_work_type), intent(in), target :: self
-      real(dp), intent(in) :: before(self%grid%nx, self%grid%rows())
       real(dp) :: overlap
       real(dp), allocatable :: rows(:)
       real(sp), allocatable :: correction(:)
@@ -85,7 +85,7 @@ contains
       integer :: j, k, jb
 
       allocate (rows(self%grid%rows()), source=0.0_dp)
-      !$omp parallel default(none) shared(self, before, rows) private(j, k, jb, correction, response) &
+      !$omp parallel default(none) shared(self, rows) private(j, k, jb, correction, response) &
       !$omp num_threads(self%threads)
       allocate (correction(self%grid%nx))
       !$omp do schedule(dynamic)
@@ -97,14 +97,14 @@ contains
                associate (a => self%active%first(k, j), b => self%active%last(k, j))
                   rows(j) = rows(j) + overlap_cells(b - a + 1, self%preconditioner%length, &
                      self%preconditioner%image(a:b, j), response(a:b), correction(a:b), &
-                     self%preconditioner%residual(a:b, j), before(a:b, j))
+                     self%preconditioner%residual(a:b, j), self%preconditioner%before(a:b, j))
                end associate
             end do
          end do
       end do
       !$omp end parallel
       overlap = row_total(rows)
-   end function overlap_with
+   end function overlap_with_before
 
    !> Compute direction = z + beta direction where it acts: on S, except in cells without pressure in which z is
    !> negative. The constant that makes sum(direction) zero is kept in `offset` and not subtracted; the product r.d is
@@ -240,27 +240,27 @@ contains
       end do
    end subroutine direction_row
 
-   !> Update P = P + alpha step and gap = gap + factor A step, and survey the new state.
-   subroutine update_state(self, operator, prescribed, factor, alpha, step, pressure, gap)
+   !> Add a multiple of the projected step s to P and of A s to the gap, and survey the new state.
+   subroutine update_state(self, operator, prescribed, multiple, modulus, pressure, gap)
       type(normal_work_type), intent(inout) :: self
-      type(convolution_type), intent(inout) :: operator   !! holds the columns of A step
+      type(convolution_type), intent(inout) :: operator   !! holds the columns of A s
       real(dp), intent(in) :: prescribed             !! level, m
-      real(dp), intent(in) :: factor, alpha
-      real(dp), intent(in) :: step(self%grid%nx, self%grid%rows())
+      real(dp), intent(in) :: multiple
+      real(dp), intent(in) :: modulus                !! Pa
       real(dp), intent(inout) :: pressure(self%grid%nx, self%grid%rows())
       real(dp), intent(inout) :: gap(self%grid%nx, self%grid%rows())
       type(state_sums_type) :: sums
       integer :: j, k, n
 
-      !$omp parallel do default(none) shared(self, operator, prescribed, factor, alpha, step, pressure, gap) &
+      !$omp parallel do default(none) shared(self, operator, prescribed, multiple, modulus, pressure, gap) &
       !$omp private(j, k, n, sums) schedule(dynamic, 8) num_threads(self%threads)
       do j = 1, self%grid%rows()
-         call operator%add_backward_row(1, j, factor, gap(:, j))
+         call operator%add_backward_row(1, j, multiple/modulus, gap(:, j))
          sums = state_sums_type()
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j))
                n = self%active%last(k, j) - first + 1
-               call load_cells(n, alpha, prescribed, gap(first, j), step(first, j), &
+               call load_cells(n, multiple, self%trial, prescribed, gap(first, j), self%direction(first, j), &
                   pressure(first, j), sums)
             end associate
          end do

@@ -12,8 +12,19 @@ module normal_sweeps
    implicit none
    private
 
-   public :: above_cells, changed_trial_cells, clip_cells, count_cells_below, direction_cells, load_cells, &
-      longest_cells, measure_cells, overlap_cells, residual_cells, spread_cells, trial_cells
+   public :: changed_trial_cells, count_cells_below, direction_cells, form_trial_cells, load_cells, longest_cells, lower_cells, &
+      measure_cells, overlap_cells, residual_cells, spread_cells, step_cells, trial_cells, trial_type
+
+   !> A trial pressure and its projection on the admissible pressures, which give the step
+   !>     s = factor max(P + alpha (d - offset) - shift, 0) - P
+   !> in the cells in which the direction d acts, and s = -P in the others. Neither is stored: each pass that needs them
+   !> computes them from P and d, which takes less time than reading them.
+   type :: trial_type
+      real(dp) :: alpha = 0.0_dp            !! multiple of the direction
+      real(dp) :: offset = 0.0_dp           !! to be subtracted from the direction
+      real(dp) :: shift = 0.0_dp            !! Pa
+      real(dp) :: factor = 1.0_dp
+   end type trial_type
 
 contains
 
@@ -24,7 +35,7 @@ contains
       real(dp), intent(in) :: scale, level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(sp), intent(inout) :: residual(n)
-      real(dp), intent(inout) :: before(n)
+      real(sp), intent(inout) :: before(n)
       real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
       real(dp), parameter :: least = tiny(1.0_sp)
       real(dp) :: g
@@ -44,8 +55,7 @@ contains
       integer, intent(in) :: n
       real(sp), intent(in) :: length
       real(sp), intent(in) :: image(n), response(n), correction(n)   !! z = image + length response + ...
-      real(sp), intent(in) :: residual(n)
-      real(dp), intent(in) :: before(n)
+      real(sp), intent(in) :: residual(n), before(n)
       real(dp) :: overlap
       integer :: i
 
@@ -116,132 +126,164 @@ contains
       square = square + total
    end subroutine spread_cells
 
-   !> Compute trial = P + alpha (direction - offset), and its sums above the limit 0.
-   pure subroutine trial_cells(n, alpha, offset, pressure, direction, trial, sums)
+   !> Compute the trial pressure above the shift.
+   pure subroutine form_trial_cells(n, trial, pressure, direction, values)
       integer, intent(in) :: n
-      real(dp), intent(in) :: alpha, offset
+      type(trial_type), intent(in) :: trial
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(in) :: direction(n)
-      real(dp), intent(inout) :: trial(n)
-      type(trial_sums_type), intent(inout) :: sums
-      real(dp) :: total, cells, lowest
+      real(dp), intent(inout) :: values(n)
       integer :: i
 
+      do i = 1, n
+         values(i) = trial_of(trial%alpha, trial%alpha*trial%offset + trial%shift, pressure(i), direction(i))
+      end do
+   end subroutine form_trial_cells
+
+   !> Form the sums of the trial pressure above the shift.
+   pure subroutine trial_cells(n, trial, pressure, direction, sums)
+      integer, intent(in) :: n
+      type(trial_type), intent(in) :: trial
+      real(dp), intent(in) :: pressure(n)
+      real(sp), intent(in) :: direction(n)
+      type(trial_sums_type), intent(inout) :: sums
+      real(dp) :: alpha, lowered, factor
+      real(dp) :: total, cells, lowest, value
+      integer :: i
+
+      alpha = trial%alpha
+      lowered = trial%alpha*trial%offset + trial%shift
+      factor = trial%factor
       total = 0.0_dp
       cells = 0.0_dp
       lowest = sums%least
-      !$omp simd reduction(+:total, cells) reduction(min:lowest)
+      !$omp simd reduction(+:total, cells) reduction(min:lowest) private(value)
       do i = 1, n
-         trial(i) = pressure(i) + alpha*(direction(i) &
-            - offset*acts(direction(i)))
-         total = total + max(trial(i), 0.0_dp)
-         cells = cells + positive(trial(i))
-         lowest = min(lowest, trial(i))
+         value = trial_of(alpha, lowered, pressure(i), direction(i))
+         total = total + max(value, 0.0_dp)
+         cells = cells + positive(value)
+         lowest = min(lowest, value)
       end do
       sums%above = sums%above + total
       sums%cells = sums%cells + cells
       sums%least = lowest
    end subroutine trial_cells
 
-   !> Add the change that the release of cells has caused to the direction, and compute
-   !> trial = P + alpha (direction - offset) and its sums above 0. In the cells that were released, and in all others in
-   !> which the direction does not act, the trial pressure is so low that it will be 0 after any projection. (Their
-   !> least trial pressure counts as -P.)
-   pure subroutine changed_trial_cells(n, alpha, offset, length, image, response, correction, residual, pressure, &
-      direction, trial, sums)
+   !> Add the change that the release of cells has caused to the direction, and form the sums of the trial pressure above
+   !> 0. Afterwards the direction acts only in the cells that were not released. (In the others the least trial pressure
+   !> counts as -P.)
+   pure subroutine changed_trial_cells(n, trial, length, image, response, correction, residual, pressure, direction, sums)
       integer, intent(in) :: n
-      real(dp), intent(in) :: alpha, offset
+      type(trial_type), intent(in) :: trial
       real(sp), intent(in) :: length
       real(sp), intent(in) :: image(n), response(n), correction(n)   !! change = image + length response + ...
       real(sp), intent(in) :: residual(n)
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(inout) :: direction(n)
-      real(dp), intent(inout) :: trial(n)
       type(trial_sums_type), intent(inout) :: sums
-      real(dp), parameter :: lowest = -huge(1.0_dp)
-      real(dp) :: total, cells, least, kept, value
+      real(dp) :: alpha, lowered, factor
+      real(dp) :: total, cells, lowest, kept, value
       real(sp) :: d, inside
       integer :: i
 
+      alpha = trial%alpha
+      lowered = trial%alpha*trial%offset + trial%shift
+      factor = trial%factor
       total = 0.0_dp
       cells = 0.0_dp
-      least = sums%least
-      !$omp simd reduction(+:total, cells) reduction(min:least) private(d, inside, kept, value)
+      lowest = sums%least
+      !$omp simd reduction(+:total, cells) reduction(min:lowest) private(d, inside, kept, value)
       do i = 1, n
          inside = acts(residual(i))*acts(direction(i))
          d = inside*(direction(i) + (image(i) + length*response(i) + correction(i)))
          direction(i) = d
          kept = inside
-         value = kept*(pressure(i) + alpha*(d - offset))
-         trial(i) = value + (1.0_dp - kept)*lowest
+         value = trial_of(alpha, lowered, pressure(i), d)
          total = total + max(value, 0.0_dp)
          cells = cells + positive(value)
-         least = min(least, value - (1.0_dp - kept)*pressure(i))
+         lowest = min(lowest, value - (1.0_dp - kept)*pressure(i))
       end do
       sums%above = sums%above + total
       sums%cells = sums%cells + cells
-      sums%least = least
+      sums%least = lowest
    end subroutine changed_trial_cells
 
-   !> Sum of the parts of the values above a limit, and the number of such values.
-   pure subroutine above_cells(n, limit, values, sums)
+   !> Compute the projected step and its sums.
+   pure subroutine step_cells(n, trial, level, pressure, gap, direction, step, column, sums)
       integer, intent(in) :: n
-      real(dp), intent(in) :: limit
-      real(dp), intent(in) :: values(n)
-      type(trial_sums_type), intent(inout) :: sums
-      real(dp) :: total, cells
-      integer :: i
-
-      total = 0.0_dp
-      cells = 0.0_dp
-      !$omp simd reduction(+:total, cells)
-      do i = 1, n
-         total = total + max(values(i) - limit, 0.0_dp)
-         cells = cells + positive(values(i) - limit)
-      end do
-      sums%above = sums%above + total
-      sums%cells = sums%cells + cells
-   end subroutine above_cells
-
-   !> Compute step = factor max(trial - shift, 0) - P. In: `step` holds the trial pressure.
-   pure subroutine clip_cells(n, factor, shift, level, pressure, gap, step, column, sums)
-      integer, intent(in) :: n
-      real(dp), intent(in) :: factor, shift, level
+      type(trial_type), intent(in) :: trial
+      real(dp), intent(in) :: level
       real(dp), intent(in) :: pressure(n), gap(n)
+      real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: step(n)
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
       type(step_sums_type), intent(inout) :: sums
-      real(dp) :: product, square
+      real(dp) :: alpha, lowered, factor
+      real(dp) :: product, square, s
       integer :: i
 
+      alpha = trial%alpha
+      lowered = trial%alpha*trial%offset + trial%shift
+      factor = trial%factor
       product = 0.0_dp
       square = 0.0_dp
-      !$omp simd reduction(+:product, square)
+      !$omp simd reduction(+:product, square) private(s)
       do i = 1, n
-         step(i) = factor*max(step(i) - shift, 0.0_dp) - pressure(i)
-         column(i) = column(i) + step(i)
-         product = product + (level - gap(i))*step(i)
-         square = square + step(i)**2
+         s = factor*max(trial_of(alpha, lowered, pressure(i), direction(i)), 0.0_dp) - pressure(i)
+         step(i) = s
+         column(i) = column(i) + s
+         product = product + (level - gap(i))*s
+         square = square + s**2
       end do
       sums%slope = sums%slope + product
       sums%square = sums%square + square
-   end subroutine clip_cells
+   end subroutine step_cells
 
-   !> Reduce `longest` to the longest multiple of the step for which no pressure becomes negative.
-   pure subroutine longest_cells(n, pressure, step, longest)
+   !> Lower the direction where it acts. It must not become 0 there.
+   pure subroutine lower_cells(n, lowered, direction)
       integer, intent(in) :: n
-      real(dp), intent(in) :: pressure(n), step(n)
-      real(dp), intent(inout) :: longest
-      real(dp) :: fastest
+      real(dp), intent(in) :: lowered(n)
+      real(sp), intent(inout) :: direction(n)
       integer :: i
 
-      fastest = tiny(1.0_dp)
-      !$omp simd reduction(max:fastest)
+      !$omp simd
       do i = 1, n
-         fastest = max(fastest, -step(i)/max(pressure(i), tiny(1.0_dp)))
+         direction(i) = acts(direction(i))*(direction(i) - real(lowered(i), sp) + tiny(1.0_sp))
+      end do
+   end subroutine lower_cells
+
+   !> Reduce `longest` to the longest multiple of the step for which no pressure becomes negative.
+   pure subroutine longest_cells(n, trial, pressure, direction, longest)
+      integer, intent(in) :: n
+      type(trial_type), intent(in) :: trial
+      real(dp), intent(in) :: pressure(n)
+      real(sp), intent(in) :: direction(n)
+      real(dp), intent(inout) :: longest
+      real(dp) :: alpha, lowered, factor
+      real(dp) :: fastest, kept
+      integer :: i
+
+      alpha = trial%alpha
+      lowered = trial%alpha*trial%offset + trial%shift
+      factor = trial%factor
+      fastest = tiny(1.0_dp)
+      !$omp simd reduction(max:fastest) private(kept)
+      do i = 1, n
+         kept = factor*max(trial_of(alpha, lowered, pressure(i), direction(i)), 0.0_dp)
+         fastest = max(fastest, (pressure(i) - kept)/max(pressure(i), tiny(1.0_dp)))
       end do
       longest = min(longest, 1.0_dp/fastest)
    end subroutine longest_cells
+
+   !> The trial pressure of a cell above the shift; 0 if the direction does not act there.
+   elemental function trial_of(alpha, lowered, pressure, direction) result(value)
+      real(dp), intent(in) :: alpha, lowered
+      real(dp), intent(in) :: pressure
+      real(sp), intent(in) :: direction
+      real(dp) :: value
+
+      value = acts(direction)*(pressure + (alpha*direction - lowered))
+   end function trial_of
 
    !> 1 if x > 0 and 0 otherwise, without a branch.
    elemental function positive(x)
@@ -259,26 +301,33 @@ contains
       acts = 0.5_sp + sign(0.5_sp, abs(direction) - tiny(1.0_sp))
    end function acts
 
-   !> Update P = P + alpha step, and form the sums of the new state without its least gap.
-   pure subroutine load_cells(n, alpha, target, gap, step, pressure, sums)
+   !> Add a multiple of the projected step to P, and form the sums of the new state without its least gap.
+   pure subroutine load_cells(n, multiple, trial, target, gap, direction, pressure, sums)
       integer, intent(in) :: n
-      real(dp), intent(in) :: alpha
+      real(dp), intent(in) :: multiple
+      type(trial_type), intent(in) :: trial
       real(dp), intent(in) :: target                !! prescribed level
-      real(dp), intent(in) :: gap(n), step(n)
+      real(dp), intent(in) :: gap(n)
+      real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: pressure(n)
       type(state_sums_type), intent(inout) :: sums
-      real(dp) :: load, work, touched, cells, distance, p, inside
+      real(dp) :: alpha, lowered, factor
+      real(dp) :: load, work, touched, cells, distance, p, s, inside
       integer :: i
 
+      alpha = trial%alpha
+      lowered = trial%alpha*trial%offset + trial%shift
+      factor = trial%factor
       load = 0.0_dp
       work = 0.0_dp
       touched = 0.0_dp
       cells = 0.0_dp
       distance = 0.0_dp
-      !$omp simd reduction(+:load, work, touched, cells, distance) private(p, inside)
+      !$omp simd reduction(+:load, work, touched, cells, distance) private(p, s, inside)
       do i = 1, n
          ! Round-off must not make the pressure negative in a cell where the step removes all of it.
-         p = max(pressure(i) + alpha*step(i), 0.0_dp)
+         s = factor*max(trial_of(alpha, lowered, pressure(i), direction(i)), 0.0_dp) - pressure(i)
+         p = max(pressure(i) + multiple*s, 0.0_dp)
          pressure(i) = p
          load = load + p
          work = work + p*gap(i)

@@ -33,6 +33,7 @@ module schur_passes
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       type(image_sums_type) :: sums                      !! of the residual and its image
       real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
+      real(sp), allocatable :: before(:, :)              !! [nx, ny], the residual of the iteration before
       real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
       real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
       real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
@@ -49,22 +50,22 @@ module schur_passes
 
 contains
 
-   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K.
-   subroutine residual_pass(self, coarse, active, scale, level, pressure, gap, before)
+   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K. The
+   !> residual before is kept.
+   subroutine residual_pass(self, coarse, active, scale, level, pressure, gap)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: scale                      !! a power of two
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
-      real(dp), intent(inout) :: before(self%grid%nx, self%grid%rows())   !! out: the residual before
       type(image_sums_type), allocatable :: rows(:)
       real(sp), allocatable :: column(:)
       real(dp) :: totals(2)
       integer :: j, k, jb
 
       allocate (rows(self%grid%rows()))
-      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, before, rows) &
+      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
       !$omp private(j, k, jb, column) num_threads(self%threads)
       allocate (column(self%grid%nx))
       !$omp do schedule(dynamic)
@@ -74,7 +75,7 @@ contains
             do k = 1, active%runs(j)
                associate (first => active%first(k, j))
                   call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
-                     gap(first, j), self%residual(first, j), before(first, j), column(first))
+                     gap(first, j), self%residual(first, j), self%before(first, j), column(first))
                end associate
             end do
             call close_row(self, self%residual(:, j))

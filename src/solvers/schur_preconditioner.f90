@@ -29,7 +29,7 @@
 !> For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
-!> rim around the contact (the wide blocks of module `active_blocks`). Memory: four such fields, of which two lie in memory
+!> rim around the contact (the wide blocks of module `active_blocks`). Memory: five such fields, of which two lie in memory
 !> that the caller lends.
 module schur_preconditioner
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
@@ -37,12 +37,13 @@ module schur_preconditioner
    use coarse_level, only : coarse_level_type
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, pi, sp
+   use normal_sweeps, only : trial_type
    use regular_grid, only : grid_type
    use row_halo, only : new_rim_halo
    use schur_blocks, only : new_schur_blocks
    use schur_coarse, only : om, stencil_c0, stencil_c1
    use schur_passes, only : residual_pass, schur_fields_type, search_pass, step_type
-   use schur_release, only : release_pass, trial_type
+   use schur_release, only : release_pass
    use schur_sweeps, only : response_sums_type
    use wave_preconditioner, only : new_wave_preconditioner, wave_preconditioner_type
    implicit none
@@ -93,6 +94,7 @@ contains
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([stencil_c0 + 2.0_dp*(wx + wy), wx, wy], sp)
       allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
+      if (.not. self%by_waves) allocate (self%before(grid%nx, grid%rows()), source=0.0_sp)
       allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
       call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
       self%image => pair(:, :, 1)
@@ -103,19 +105,18 @@ contains
 
    !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K. The
    !> residual before is kept, except if M r comes from `waves`.
-   subroutine set_residual(self, coarse, active, scale, level, pressure, gap, before)
+   subroutine set_residual(self, coarse, active, scale, level, pressure, gap)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: scale                      !! a power of two
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
-      real(dp), intent(inout) :: before(self%grid%nx, self%grid%rows())   !! is set to the residual before
 
       if (self%by_waves) then
          call self%waves%set_residual(coarse, active, scale, level, pressure, gap, self%residual)
       else
-         call residual_pass(self, coarse, active, scale, level, pressure, gap, before)
+         call residual_pass(self, coarse, active, scale, level, pressure, gap)
       end if
    end subroutine set_residual
 

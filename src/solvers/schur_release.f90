@@ -13,17 +13,12 @@ module schur_release
    use asperity_precision, only : dp, sp
    use coarse_level, only : coarse_level_type
    use field_sums, only : row_total
+   use normal_sweeps, only : trial_type
    use schur_passes, only : add_blocks, schur_fields_type
    implicit none
    private
 
-   public :: release_pass, trial_type
-
-   !> The trial pressure P + alpha (d - offset).
-   type :: trial_type
-      real(dp) :: alpha = 0.0_dp
-      real(dp) :: offset = 0.0_dp
-   end type trial_type
+   public :: release_pass
 
 contains
 
