@@ -5,8 +5,10 @@
 !> outside the contact, and its response e = K d. The passes return sums over the cells, and store the sums of each block
 !> in `blocks`. The innermost loops are in module `schur_sweeps`.
 !>
-!> The stencil is applied first to the rows whose neighbours belong to the same block. The rows at the edges of a block
-!> follow after all blocks, because they read rows that another thread or process forms.
+!> The stencil is applied first to the rows whose neighbours belong to the same row of blocks, and to the two rows at its
+!> edges once the next row of blocks has been passed, while both are in the cache. Each thread passes portions of several
+!> rows of blocks. The edges of the first and the last one of a portion follow after all portions, because they read
+!> rows that another thread or process forms. All sums are formed in the same order whatever the portions are.
 module schur_passes
    use active_blocks, only : active_blocks_type
    use asperity_precision, only : dp, sp
@@ -23,6 +25,9 @@ module schur_passes
    private
 
    public :: add_blocks, residual_pass, schur_fields_type, search_pass, step_type
+
+   integer, parameter :: together = 16            !! rows of blocks of a portion, at most
+   integer, parameter :: portions_of_thread = 8   !! at least, if there are enough rows of blocks
 
    !> The fields of the preconditioner and its stencil.
    type :: schur_fields_type
@@ -60,40 +65,31 @@ contains
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
       type(image_sums_type), allocatable :: rows(:)
-      real(sp), allocatable :: column(:)
       real(dp) :: totals(2)
-      integer :: j, k, jb
+      integer :: c, jb, strips(2)
 
       allocate (rows(self%grid%rows()))
-      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
-      !$omp private(j, k, jb, column) num_threads(self%threads)
-      allocate (column(self%grid%nx))
+      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) private(c, jb, strips) &
+      !$omp num_threads(self%threads)
       !$omp do schedule(dynamic)
-      do jb = coarse%strips(1), coarse%strips(2)
-         column(:) = 0.0_sp
-         do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
-            do k = 1, active%runs(j)
-               associate (first => active%first(k, j))
-                  call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
-                     gap(first, j), self%residual(first, j), self%before(first, j), column(first))
-               end associate
-            end do
-            call close_row(self, self%residual(:, j))
+      do c = 1, portions(self, coarse)
+         strips = portion(self, coarse, c)
+         do jb = strips(1), strips(2)
+            call residual_rows(self, coarse, active, jb, scale, level, pressure, gap)
+            call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
+            if (jb - 1 > strips(1)) call image_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), rows)
          end do
-         call coarse%sum_blocks(column, coarse%mean(:, jb))
-         coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
-         self%blocks%image_off(:, jb) = 0.0_dp
-         self%blocks%cells_off(:, jb) = 0.0_dp
-         call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
       end do
       !$omp end do
       !$omp single
       call self%rim%close_rim(self%residual)
       !$omp end single
-      ! The rows at the edges of blocks need rows that another thread may have formed.
       !$omp do schedule(dynamic)
-      do jb = coarse%strips(1), coarse%strips(2)
-         call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
+      do c = 1, portions(self, coarse)
+         strips = portion(self, coarse, c)
+         do jb = strips(1), strips(2), max(strips(2) - strips(1), 1)
+            call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
+         end do
       end do
       !$omp end parallel
       call coarse%share_blocks(coarse%mean)
@@ -102,6 +98,33 @@ contains
       totals = row_totals(transpose(reshape([rows%form, rows%square], [size(rows), 2])))
       self%sums = image_sums_type(totals(1), totals(2))
    end subroutine residual_pass
+
+   !> Compute the residual and its block means in the rows of a block.
+   subroutine residual_rows(self, coarse, active, jb, scale, level, pressure, gap)
+      class(schur_fields_type), intent(inout) :: self
+      type(coarse_level_type), intent(inout) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      real(dp), intent(in) :: scale, level
+      real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
+      real(sp), allocatable :: column(:)
+      integer :: j, k
+
+      allocate (column(self%grid%nx), source=0.0_sp)
+      do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+         do k = 1, active%runs(j)
+            associate (first => active%first(k, j))
+               call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
+                  gap(first, j), self%residual(first, j), self%before(first, j), column(first))
+            end associate
+         end do
+         call close_row(self, self%residual(:, j))
+      end do
+      call coarse%sum_blocks(column, coarse%mean(:, jb))
+      coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
+      self%blocks%image_off(:, jb) = 0.0_dp
+      self%blocks%cells_off(:, jb) = 0.0_dp
+   end subroutine residual_rows
 
    !> Compute the image of the residual by K in some rows of a block.
    subroutine image_rows(self, coarse, active, jb, which, rows)
@@ -138,26 +161,32 @@ contains
       type(response_sums_type), intent(out) :: sums
       type(response_sums_type), allocatable :: rows(:)
       real(dp) :: totals(3)
-      integer :: j, jb
+      integer :: c, jb, strips(2)
 
       allocate (rows(self%grid%rows()))
-      !$omp parallel default(none) shared(self, coarse, active, step, rows) private(j, jb) &
+      !$omp parallel default(none) shared(self, coarse, active, step, rows) private(c, jb, strips) &
       !$omp num_threads(self%threads)
       !$omp do schedule(dynamic)
-      do jb = coarse%strips(1), coarse%strips(2)
-         self%blocks%response_off(:, jb) = 0.0_dp
-         if (active%wide_runs(jb) == 0) cycle
-         call search_rows(self, coarse, active, jb, step)
-         call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, rows)
+      do c = 1, portions(self, coarse)
+         strips = portion(self, coarse, c)
+         do jb = strips(1), strips(2)
+            self%blocks%response_off(:, jb) = 0.0_dp
+            call search_rows(self, coarse, active, jb, step)
+            call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, rows)
+            if (jb - 1 > strips(1)) &
+               call response_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), step%last, rows)
+         end do
       end do
       !$omp end do
       !$omp single
       call self%rim%close_rim(self%search)
       !$omp end single
       !$omp do schedule(dynamic)
-      do jb = coarse%strips(1), coarse%strips(2)
-         if (active%wide_runs(jb) == 0) cycle
-         call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
+      do c = 1, portions(self, coarse)
+         strips = portion(self, coarse, c)
+         do jb = strips(1), strips(2), max(strips(2) - strips(1), 1)
+            call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
+         end do
       end do
       !$omp end parallel
       call coarse%share_blocks(self%blocks%response_off)
@@ -175,6 +204,7 @@ contains
       real(sp), allocatable :: added(:), corrected(:)
       integer :: j, k, n
 
+      if (active%wide_runs(jb) == 0) return
       allocate (added(self%grid%nx), corrected(self%grid%nx))
       added(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
       corrected(:) = real(self%blocks%correction(coarse%block_x, jb), sp)
@@ -207,6 +237,7 @@ contains
       real(sp), allocatable :: column(:)
       integer :: j, k, n
 
+      if (active%wide_runs(jb) == 0) return
       allocate (column(self%grid%nx), source=0.0_sp)
       do j = which(1), which(2), which(3)
          do k = 1, active%wide_runs(jb)
@@ -225,6 +256,30 @@ contains
       end do
       if (.not. last) call add_blocks(coarse, column, self%blocks%response_off(:, jb))
    end subroutine response_rows
+
+   !> The number of portions of the rows of blocks that threads pass one after the other. There are several for each
+   !> thread, because some take longer than others.
+   pure integer function portions(self, coarse)
+      class(schur_fields_type), intent(in) :: self
+      type(coarse_level_type), intent(in) :: coarse
+
+      associate (strips => coarse%strips(2) - coarse%strips(1) + 1)
+         portions = min(max((strips + together - 1)/together, portions_of_thread*self%threads), strips)
+      end associate
+   end function portions
+
+   !> The first and the last row of blocks of a portion.
+   pure function portion(self, coarse, c) result(strips)
+      class(schur_fields_type), intent(in) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: c
+      integer :: strips(2)
+      integer :: count, parts
+
+      count = coarse%strips(2) - coarse%strips(1) + 1
+      parts = portions(self, coarse)
+      strips = coarse%strips(1) + [(c - 1)*count/parts, c*count/parts - 1]
+   end function portion
 
    !> Add sums over the blocks along x.
    pure subroutine add_blocks(coarse, column, blocks)
