@@ -12,7 +12,6 @@ module test_schur
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
-   use schur_release, only : trial_type
    implicit none
    private
 
@@ -318,22 +317,22 @@ contains
       integer, intent(in) :: steps
       real(dp), intent(out) :: z(:)
       real(dp), intent(out) :: form
-      real(dp), allocatable :: pressure(:, :), gap(:, :), step(:, :), out(:, :)
+      real(dp), allocatable :: pressure(:, :), gap(:, :), out(:, :)
       real(sp), allocatable :: direction(:, :)
       real(dp) :: least
       integer :: i, j, jb
 
-      allocate (pressure(s%grid%nx, s%grid%ny), gap(s%grid%nx, s%grid%ny), step(s%grid%nx, s%grid%ny))
+      allocate (pressure(s%grid%nx, s%grid%ny), gap(s%grid%nx, s%grid%ny))
       allocate (direction(s%grid%nx, s%grid%ny), out(s%grid%nx, s%grid%ny))
       pressure(:, :) = reshape(merge(1.0_dp, 0.0_dp, inside), shape(gap))
       gap(:, :) = reshape(merge(-r, 1.0_dp, inside), shape(gap))
-      call s%active%clear(s%preconditioner%residual, direction, s%preconditioner%search, step)
+      call s%active%clear(s%preconditioner%residual, direction, s%preconditioner%search)
       do j = 1, s%grid%ny
          call s%active%survey_row(.true., j, pressure(:, j), gap(:, j), least)
       end do
-      call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction, step)
+      call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction)
       call s%active%list_wide_runs(s%preconditioner%search, far=.false.)
-      call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap, step)
+      call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
       call s%preconditioner%extend(s%coarse, s%active, steps, form)
       do jb = 1, s%coarse%ny
          do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1
