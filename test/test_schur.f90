@@ -11,6 +11,7 @@ module test_schur
    use kernels, only : normal_half_space
    use asperity_precision, only : dp, sp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
+   use normal_sweeps, only : trial_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
    private

@@ -163,8 +163,8 @@ contains
       integer :: kind
 
       kind = merge(2, 1, case%grid%boundary == boundary_free)
-      fields = 5.9_dp + spectrum(kind)
-      if (case%solver%method == 'thesis') fields = fields - 2.0_dp
+      fields = 5.4_dp + spectrum(kind)
+      if (case%solver%method == 'thesis') fields = fields - 1.5_dp
       if (case%solver%method /= 'thesis' .and. case%grid%very_oblong()) fields = fields + 0.625_dp
       fields = fields + merge(symbols_mixed(kind), symbol(kind), case%solver%precision == 'mixed')
    end function normal_fields

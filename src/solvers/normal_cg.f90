@@ -50,7 +50,7 @@ module normal_cg
    use gap_watch, only : gap_watch_type, new_gap_watch
    use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
       phase_conjugate, phase_ended, phase_restart
-   use normal_passes, only : new_normal_work, normal_work_type, survey, update_state
+   use normal_passes, only : as_formed, new_normal_work, normal_work_type, survey, update_state
    use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, fault_of_problem, &
       first_pressure, gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, &
       remove_round_off, return_solution
@@ -155,7 +155,7 @@ contains
          call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
          effort = 0.0_dp
          if (determined) call self%start_on_coarse_grid(task, height, pressure, effort, past)
-         call self%work%active%clear(self%work%preconditioner%residual, self%work%direction, &
+         call self%work%active%clear(self%work%preconditioner%residual, self%work%direction(:, :, as_formed), &
             self%work%preconditioner%search)
          self%work%scale = 0.0_dp
          self%work%offset = 0.0_dp
@@ -195,7 +195,7 @@ contains
          if (outcome%iterations >= problem%max_iterations) now%phase = phase_ended
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
-            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction)
+            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction(:, :, as_formed))
             call work%active%list_wide_runs(work%preconditioner%search, far=far_rim_pays(cells))
          end associate
       end subroutine measure_state

@@ -25,7 +25,7 @@
 module normal_iteration
    use asperity_precision, only : dp
    use fft_conv, only : columns_apply, convolution_type
-   use normal_passes, only : mean_stiffness, new_direction, normal_work_type, overlap_with_before, predict_form
+   use normal_passes, only : as_formed, mean_stiffness, new_direction, normal_work_type, overlap_with_before, predict_form
    use normal_projection, only : find_clip, keep_block_sums, longest_multiple, project_step, try_pressure
    use normal_state, only : control_pressure, gap_measure_type, normal_problem_type, reason_iterations
    use normal_sums, only : step_sums_type, trial_sums_type
@@ -195,7 +195,7 @@ contains
       fixed_load = task%control == control_pressure
       alpha = trial_length(work, task%modulus, now)
       if (is_releasing(now)) call work%preconditioner%release(work%coarse, work%active, &
-         steps_after(now%class), trial_type(alpha, work%offset), pressure, work%direction)
+         steps_after(now%class), trial_type(alpha, work%offset), pressure, work%direction(:, :, as_formed))
       call try_pressure(work, alpha, pressure, trial)
       if (trial%cells < 1.0_dp .and. fixed_load) then
          call shorten(now)

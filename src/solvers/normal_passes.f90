@@ -20,6 +20,8 @@ module normal_passes
    public :: mean_stiffness, new_direction, new_normal_work, normal_work_type, overlap_with_before, predict_form, survey, &
       update_state
 
+   integer, parameter, public :: as_formed = 1, lowered = 2   !! directions of `normal_work_type`
+
    !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
    !> inverse compliance of an open cell that is surrounded by cells in contact.
    real(dp), parameter :: of_open_cells = 2.0_dp
@@ -34,7 +36,8 @@ module normal_passes
       type(active_blocks_type) :: active             !! where residual, direction and step are not 0
       type(schur_preconditioner_type) :: preconditioner   !! holds the residual
       real(dp) :: scale = 0.0_dp                     !! of the residual and the direction; 0: not chosen yet
-      real(sp), allocatable :: direction(:, :)       !! [nx, rows]
+      real(sp), allocatable :: direction(:, :, :)    !! [nx, rows, as formed and, for very oblong cells, lowered]
+      integer :: tried = as_formed                   !! the direction of the trial pressure: as formed, or lowered
       real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
       type(trial_type) :: trial                      !! the step along the direction
       type(state_sums_type), allocatable :: state(:)   !! of each row of the present state
@@ -51,11 +54,12 @@ contains
 
       self%grid = operator%grid
       self%threads = operator%threads
-      allocate (self%direction(self%grid%nx, self%grid%rows()), source=0.0_sp)
       allocate (self%state(self%grid%rows()))
       call new_coarse_level(self%coarse, self%grid, operator%kernel, error)
       if (.not. allocated(error)) call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, &
          self%threads, operator%spectrum_memory(), error)
+      allocate (self%direction(self%grid%nx, self%grid%rows(), merge(lowered, as_formed, self%preconditioner%by_waves)), &
+         source=0.0_sp)
       if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse%first_y, &
          self%coarse%strips, .not. self%preconditioner%by_waves, self%threads)
    end subroutine new_normal_work
@@ -156,7 +160,7 @@ contains
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             do k = 1, self%active%runs(j)
                associate (first => self%active%first(k, j))
-                  call spread_cells(self%active%last(k, j) - first + 1, self%offset, self%direction(first, j), &
+                  call spread_cells(self%active%last(k, j) - first + 1, self%offset, self%direction(first, j, as_formed), &
                      column(first), squares(j))
                end associate
             end do
@@ -235,7 +239,7 @@ contains
          associate (a => self%active%first(k, j), b => self%active%last(k, j))
             call direction_cells(b - a + 1, length, image(a:b), response(a:b), correction(a:b), &
                self%preconditioner%residual(a:b, j), real(beta, sp), real(self%offset, sp), pressure(a:b), &
-               self%direction(a:b, j), sums)
+               self%direction(a:b, j, as_formed), sums)
          end associate
       end do
    end subroutine direction_row
@@ -260,8 +264,8 @@ contains
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j))
                n = self%active%last(k, j) - first + 1
-               call load_cells(n, multiple, self%trial, prescribed, gap(first, j), self%direction(first, j), &
-                  pressure(first, j), sums)
+               call load_cells(n, multiple, self%trial, prescribed, gap(first, j), &
+                  self%direction(first, j, self%tried), pressure(first, j), sums)
             end associate
          end do
          call self%active%survey_row(.false., j, pressure(:, j), gap(:, j), sums%least)

@@ -8,7 +8,7 @@ module normal_projection
    use asperity_precision, only : dp, sp
    use fft_conv, only : convolution_type
    use field_sums, only : least_of_rows
-   use normal_passes, only : normal_work_type
+   use normal_passes, only : as_formed, lowered, normal_work_type
    use normal_sums, only : step_sums_type, total, trial_sums_type
    use normal_sweeps, only : changed_trial_cells, form_trial_cells, longest_cells, lower_cells, step_cells, trial_cells, &
       trial_type
@@ -30,6 +30,7 @@ contains
       type(trial_sums_type), intent(out) :: sums
 
       self%trial = trial_type(alpha, self%offset)
+      self%tried = as_formed
       if (self%preconditioner%released) then
          call try_changed_pressure(self, pressure, sums)
       else
@@ -54,7 +55,7 @@ contains
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j))
                call trial_cells(self%active%last(k, j) - first + 1, trial, pressure(first, j), &
-                  self%direction(first, j), rows(j))
+                  self%direction(first, j, self%tried), rows(j))
             end associate
          end do
       end do
@@ -85,7 +86,8 @@ contains
                associate (a => self%active%first(k, j), b => self%active%last(k, j))
                   call changed_trial_cells(b - a + 1, self%trial, self%preconditioner%length, &
                      self%preconditioner%image(a:b, j), response(a:b), correction(a:b), &
-                     self%preconditioner%residual(a:b, j), pressure(a:b, j), self%direction(a:b, j), rows(j))
+                     self%preconditioner%residual(a:b, j), pressure(a:b, j), &
+                     self%direction(a:b, j, as_formed), rows(j))
                end associate
             end do
          end do
@@ -94,8 +96,8 @@ contains
       sums = total(rows)
    end subroutine try_changed_pressure
 
-   !> Subtract from the direction a number per block, so that the sum of the trial pressure in each block remains what it
-   !> is if negative pressures become 0. The sums of the blocks of very oblong cells are stiff: if they change, the energy
+   !> Lower the tried direction by a number per block, so that the sum of the trial pressure in each block remains what it
+   !> is if negative pressures become 0. The next direction is formed from the present one as it was. The sums of the blocks of very oblong cells are stiff: if they change, the energy
    !> rises by much more than the direction gains.
    subroutine keep_block_sums(self, pressure, sums)
       type(normal_work_type), intent(inout) :: self
@@ -107,10 +109,11 @@ contains
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          call keep_strip_sums(self, jb, pressure)
       end do
+      self%tried = lowered
       call sum_trial(self, self%trial, pressure, sums)
    end subroutine keep_block_sums
 
-   !> Subtract a number per block from the direction in a row of blocks, for `keep_block_sums`. The numbers are found
+   !> Lower the direction by a number per block in a row of blocks, for `keep_block_sums`. The numbers are found
    !> by Newton's method from below, as in `find_clip`.
    subroutine keep_strip_sums(self, jb, pressure)
       type(normal_work_type), intent(inout) :: self
@@ -133,7 +136,8 @@ contains
       do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j), last => self%active%last(k, j))
-               call lower_cells(last - first + 1, shift(self%coarse%block_x(first:last)), self%direction(first, j))
+               call lower_cells(last - first + 1, shift(self%coarse%block_x(first:last)), &
+                  self%direction(first, j, as_formed), self%direction(first, j, lowered))
             end associate
          end do
       end do
@@ -156,7 +160,8 @@ contains
       do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j), last => self%active%last(k, j))
-               call form_trial_cells(last - first + 1, self%trial, pressure(first, j), self%direction(first, j), values(first))
+               call form_trial_cells(last - first + 1, self%trial, pressure(first, j), &
+                  self%direction(first, j, as_formed), values(first))
                do i = first, last
                   b = self%coarse%block_x(i)
                   sums(b) = sums(b) + values(i)
@@ -237,7 +242,7 @@ contains
             do k = 1, self%active%runs(j)
                associate (first => self%active%first(k, j))
                   call step_cells(self%active%last(k, j) - first + 1, self%trial, level, pressure(first, j), &
-                     gap(first, j), self%direction(first, j), step(first), column(first), rows(j))
+                     gap(first, j), self%direction(first, j, self%tried), step(first), column(first), rows(j))
                end associate
             end do
             if (self%active%runs(j) == 0) then
@@ -268,7 +273,7 @@ contains
          do k = 1, self%active%runs(j)
             associate (first => self%active%first(k, j))
                call longest_cells(self%active%last(k, j) - first + 1, self%trial, pressure(first, j), &
-                  self%direction(first, j), longest)
+                  self%direction(first, j, self%tried), longest)
             end associate
          end do
       end do

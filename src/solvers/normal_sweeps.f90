@@ -239,16 +239,17 @@ contains
       sums%square = sums%square + square
    end subroutine step_cells
 
-   !> Lower the direction where it acts. It must not become 0 there.
-   pure subroutine lower_cells(n, lowered, direction)
+   !> Compute lowered = direction - shift where the direction acts. It must not become 0 there.
+   pure subroutine lower_cells(n, shift, direction, lowered)
       integer, intent(in) :: n
-      real(dp), intent(in) :: lowered(n)
-      real(sp), intent(inout) :: direction(n)
+      real(dp), intent(in) :: shift(n)
+      real(sp), intent(in) :: direction(n)
+      real(sp), intent(inout) :: lowered(n)
       integer :: i
 
       !$omp simd
       do i = 1, n
-         direction(i) = acts(direction(i))*(direction(i) - real(lowered(i), sp) + tiny(1.0_sp))
+         lowered(i) = acts(direction(i))*(direction(i) - real(shift(i), sp) + tiny(1.0_sp))
       end do
    end subroutine lower_cells
 
