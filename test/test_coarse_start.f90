@@ -62,7 +62,7 @@ contains
    end subroutine short_waves_survive
 
    !> Solve with a start from a coarser grid, or without.
-   subroutine run_from(coarse, grid, problem, height, solution, mixed, past, start)
+   subroutine run_from(coarse, grid, problem, height, solution, mixed, past, start, between)
       logical, intent(in) :: coarse                    !! start from a coarser grid
       type(grid_type), intent(in) :: grid
       type(normal_problem_type), intent(in) :: problem
@@ -71,6 +71,7 @@ contains
       logical, intent(in), optional :: mixed           !! in mixed precision
       real(dp), intent(in), optional :: past(:, :)     !! P_h, Pa
       real(dp), intent(in), optional :: start(:, :)    !! the pressure that is given if problem%warm, Pa
+      logical, intent(in), optional :: between         !! with a grid between the two
       type(normal_solver_type) :: solver
       type(error_type), allocatable :: error
 
@@ -80,15 +81,16 @@ contains
       call check_no_error(error, 'a solver')
       solver%coarse_start_from = merge(0.0_dp, huge(1.0_dp), coarse)
       solver%replace_start_from = solver%coarse_start_from
+      if (present(between)) solver%between_from = merge(0.0_dp, huge(1.0_dp), between)
       call solver%solve(problem, height, solution%pressure, solution%gap, solution%level, solution%outcome, past)
       call solver%destroy()
    end subroutine run_from
 
-   !> From either start, a solve finds the same pressure, under a load and for an approach, in both precisions.
+   !> From each start, a solve finds the same pressure, under a load and for an approach, in both precisions.
    subroutine the_solution_is_the_same(grid)
       type(grid_type), intent(in) :: grid
       type(normal_problem_type) :: problem
-      type(solution_type) :: s, t
+      type(solution_type) :: s, t, u
       real(dp), allocatable :: height(:, :)
       real(dp) :: d, e1
       integer :: k
@@ -111,6 +113,12 @@ contains
          call check_order(d, '<=', merge(8.0_dp, 16.0_dp, k <= 2)*problem%tolerance, what//': the same pressure')
          call duality_gap(grid, problem%modulus, height, t%pressure, e1)
          if (k <= 2) call check_order(e1, '<=', 1.01_dp*problem%tolerance, what//': error recomputed')
+
+         call run_from(.true., grid, problem, height, u, modulo(k, 2) == 0, between=.true.)
+         call check_that(u%outcome%converged, what//', with a grid between: '//u%outcome%reason)
+         call check_that(any(abs(u%pressure - t%pressure) > 0.0_dp), what//': the start from between was another one')
+         call distance(grid, problem%modulus, height, s%pressure, u%pressure, d)
+         call check_order(d, '<=', merge(8.0_dp, 16.0_dp, k <= 2)*problem%tolerance, what//': the same from between')
       end do
    end subroutine the_solution_is_the_same
 

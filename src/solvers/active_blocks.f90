@@ -81,7 +81,7 @@ contains
    !> Deactivate all blocks, and set the work fields to zero.
    subroutine clear(self, residual, direction, search)
       class(active_blocks_type), intent(inout) :: self
-      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1), without its border
+      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1)
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
       real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
       integer :: j
@@ -93,6 +93,10 @@ contains
          direction(:, j) = 0.0_sp
          search(:, j) = 0.0_sp
       end do
+      residual(:, 0) = 0.0_sp
+      residual(:, self%rows + 1) = 0.0_sp
+      search(:, 0) = 0.0_sp
+      search(:, self%rows + 1) = 0.0_sp
       self%live = .false.
       self%wide = .false.
    end subroutine clear

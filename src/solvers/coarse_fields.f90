@@ -13,7 +13,7 @@ module coarse_fields
    public :: coarse_grid, coarsen, mean_of_strips, new_row_means, refine_linearly, refine_pressure, row_means_type
 
    real(dp), parameter :: least_part = 1e-3_dp   !! of the nearest pressure that an interpolated one keeps at least
-   integer, parameter :: ratio = 4         !! cells of the grid to a cell of the coarse one along a side, about
+   integer, parameter :: usual_ratio = 4         !! cells of the grid to a cell of the coarse one along a side, about
 
    !> How the means over the coarse cells of a row are formed.
    type :: row_means_type
@@ -33,17 +33,19 @@ module coarse_fields
 
 contains
 
-   !> A grid over the same lengths with about a quarter of the cells along each side, as many as are cheap to
-   !> transform. If `squarer` is true, oblong cells are joined less along their longer side.
-   function coarse_grid(fine, squarer) result(coarse)
+   !> A grid over the same lengths with about a quarter of the cells along each side, or another part, as many as are
+   !> cheap to transform. If `squarer` is true, oblong cells are joined less along their longer side.
+   function coarse_grid(fine, squarer, ratio) result(coarse)
       type(grid_type), intent(in) :: fine
       logical, intent(in), optional :: squarer
+      integer, intent(in), optional :: ratio       !! cells of the grid to a coarse one along a side, about; default: 4
       type(grid_type) :: coarse
-      integer :: joined(2)                         !! cells of the grid to a coarse one along x and y, about
+      integer :: joined(2)                         !! the same along x and y
 
-      joined = ratio
+      joined = usual_ratio
+      if (present(ratio)) joined = ratio
       if (present(squarer)) then
-         if (squarer) joined = max(1, nint(ratio*min(fine%dx, fine%dy)/[fine%dx, fine%dy]))
+         if (squarer) joined = max(1, nint(joined*min(fine%dx, fine%dy)/[fine%dx, fine%dy]))
       end if
       coarse = new_grid(fewer(fine%nx, joined(1)), fewer(fine%ny, joined(2)), fine%lx, fine%ly, fine%boundary)
       if (fine%shared) call coarse%share_rows()

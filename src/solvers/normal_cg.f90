@@ -23,7 +23,7 @@
 !>
 !> On a large grid, a solve without a given start, or with one for another load, first solves the same problem roughly on
 !> about a quarter of the cells along each side, whose means of the height are a smoother road, and starts from that
-!> pressure (nested iteration).
+!> pressure (nested iteration). On a very large grid a third grid lies between them.
 !>
 !> The solve has converged if the duality gap e1 = (mean gap weighted by the pressure - least gap)/h_rms and the
 !> error of the load are below the tolerance. If the contact is small on a tall
@@ -39,7 +39,7 @@
 !> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
 !> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
 !> mode spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more
-!> until it is found.
+!> until it is found, and 2.0 with a grid between the two.
 module normal_cg
    use coarse_fields, only : coarse_grid, coarsen, refine_pressure
    use contact_solver, only : check_normal_kernel, contact_solver_type
@@ -72,6 +72,7 @@ module normal_cg
    real(dp), parameter :: few_overlap = 8.0_dp        !! coarse cells that a given approach brings into overlap
    real(dp), parameter :: rough_tolerance = 1e-2_dp   !! of its solution: the details belong to the finer grid
    integer, parameter :: most_rough_iterations = 30
+   real(dp), parameter :: sparse = 0.03_dp            !! contact area below which a grid between the two saves no time
    real(dp), parameter :: far_load = 0.05_dp          !! change of the load for which a given start is no better
    real(dp), parameter :: nearly_full = 0.9_dp        !! contact area from which that of full contact is the better start
 
@@ -81,6 +82,7 @@ module normal_cg
       logical :: mixed = .false.                      !! products of steps in single precision
       real(dp) :: coarse_start_from = 4e4_dp          !! cells from which a solve without a start begins on a coarser grid
       real(dp) :: replace_start_from = 5e5_dp         !! the same for a solve with a start that is far away
+      real(dp) :: between_from = 3e7_dp               !! the same for a grid between the two
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
    contains
@@ -255,7 +257,9 @@ contains
    end subroutine solve
 
    !> Replace a start that is missing, or on a large grid one that is far away, by the pressure of a rough solution on a
-   !> coarser grid, if that is worth the effort.
+   !> coarser grid, if that is worth the effort. On a very large grid whose contact is not sparse, a grid between the two
+   !> follows. Without it regions of many coarse cells swing between contact and none in several iterations of the large
+   !> grid.
    recursive subroutine start_on_coarse_grid(self, task, height, pressure, effort, past)
       class(normal_solver_type), intent(in) :: self
       type(normal_problem_type), intent(inout) :: task
@@ -263,8 +267,8 @@ contains
       real(dp), intent(inout) :: pressure(:, :)            !! Pa
       real(dp), intent(out) :: effort                      !! in transforms of the size of the grid
       real(dp), intent(in), optional :: past(:, :)         !! P_h, Pa
-      type(grid_type) :: coarse
-      real(dp), allocatable :: road(:, :), memory(:, :), rough(:, :)
+      type(grid_type) :: coarse, between
+      real(dp), allocatable :: rough(:, :), better(:, :)
       logical :: useful
 
       effort = 0.0_dp
@@ -275,20 +279,22 @@ contains
       task%warm = .false.
       task%displaced = .false.
       coarse = coarse_grid(self%grid)
-      allocate (road(coarse%nx, coarse%rows()))
-      call coarsen(self%grid, coarse, height, self%operator%threads, road)
-      if (field_rms(road, field_mean(road)) < least_roughness*task%rms_height) return
-      if (task%control == control_approach .and. field_count(road + (task%target - task%datum) > 0.0_dp) < few_overlap) return
-      if (present(past)) then
-         allocate (memory, mold=road)
-         call coarsen(self%grid, coarse, past, self%operator%threads, memory)
-      end if
-
-      allocate (rough, mold=road)
-      call self%solve_roughly(coarse, task, road, memory, rough, effort, useful)
+      allocate (rough(coarse%nx, coarse%rows()))
+      call self%solve_roughly(coarse, task, height, rough, effort, useful, past)
       if (.not. useful) return
-      call refine_pressure(coarse, self%grid, rough, self%operator%threads, pressure)
       task%warm = .true.
+
+      if (self%grid%cells() >= self%between_from .and. field_count(rough > 0.0_dp) >= sparse*coarse%cells()) then
+         between = coarse_grid(self%grid, ratio=2)
+         allocate (better(between%nx, between%rows()))
+         call refine_pressure(coarse, between, rough, self%operator%threads, better)
+         call self%solve_roughly(between, task, height, better, effort, useful, past)
+         if (useful) then
+            coarse = between
+            call move_alloc(better, rough)
+         end if
+      end if
+      call refine_pressure(coarse, self%grid, rough, self%operator%threads, pressure)
    end subroutine start_on_coarse_grid
 
    !> Would a start without the given one be better? If the load has changed much, it would. At a given approach the change
@@ -302,25 +308,34 @@ contains
          is_far = abs(field_mean(pressure) - task%target) > far_load*task%target
    end function is_far
 
-   !> Solve a problem roughly on a coarser grid.
-   recursive subroutine solve_roughly(self, coarse, task, road, memory, pressure, effort, useful)
+   !> Solve a problem roughly on a coarser grid, whose road and past are means of those of the grid. The start is
+   !> `pressure` where task%warm. There is no useful solution if the coarser road is much smoother.
+   recursive subroutine solve_roughly(self, coarse, task, height, pressure, effort, useful, past)
       class(normal_solver_type), intent(in) :: self
       type(grid_type), intent(in) :: coarse
       type(normal_problem_type), intent(in) :: task        !! the problem of this solver's grid
-      real(dp), intent(in) :: road(:, :)                   !! H, m
-      real(dp), allocatable, intent(in) :: memory(:, :)    !! P_h, Pa, if there is any
-      real(dp), intent(out) :: pressure(:, :)              !! Pa
-      real(dp), intent(out) :: effort                      !! in transforms of the size of this solver's grid
+      real(dp), intent(in) :: height(:, :)                 !! H, m
+      real(dp), intent(inout) :: pressure(:, :)            !! Pa, on the coarser grid
+      real(dp), intent(inout) :: effort                    !! is increased, in transforms of the size of this solver's grid
       logical, intent(out) :: useful                       !! the pressure is a good start
+      real(dp), intent(in), optional :: past(:, :)         !! P_h, Pa
       type(normal_solver_type) :: solver
       type(normal_problem_type) :: problem
       type(solver_result_type) :: outcome
       type(error_type), allocatable :: error
-      real(dp), allocatable :: gap(:, :)
+      real(dp), allocatable :: road(:, :), memory(:, :), gap(:, :)
       real(dp) :: level
 
-      effort = 0.0_dp
       useful = .false.
+      allocate (road, mold=pressure)
+      call coarsen(self%grid, coarse, height, self%operator%threads, road)
+      if (field_rms(road, field_mean(road)) < least_roughness*task%rms_height) return
+      if (task%control == control_approach .and. field_count(road + (task%target - task%datum) > 0.0_dp) < few_overlap) return
+      if (present(past)) then
+         allocate (memory, mold=road)
+         call coarsen(self%grid, coarse, past, self%operator%threads, memory)
+      end if
+
       call new_normal_solver(solver, coarse, self%work%coarse%kernel, error, self%mixed)
       if (allocated(error)) return
       solver%coarse_start_from = huge(1.0_dp)
@@ -332,7 +347,7 @@ contains
       allocate (gap, mold=road)
       call solver%solve(problem, road, pressure, gap, level, outcome, memory)
       call solver%destroy()
-      effort = outcome%ffts*coarse%cells()/self%grid%cells()
+      effort = effort + outcome%ffts*coarse%cells()/self%grid%cells()
       useful = outcome%converged .and. field_count(pressure > 0.0_dp) < nearly_full*coarse%cells()
    end subroutine solve_roughly
 

@@ -58,8 +58,7 @@ contains
       call new_coarse_level(self%coarse, self%grid, operator%kernel, error)
       if (.not. allocated(error)) call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, &
          self%threads, operator%spectrum_memory(), error)
-      allocate (self%direction(self%grid%nx, self%grid%rows(), merge(lowered, as_formed, self%preconditioner%by_waves)), &
-         source=0.0_sp)
+      allocate (self%direction(self%grid%nx, self%grid%rows(), merge(lowered, as_formed, self%preconditioner%by_waves)))
       if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse%first_y, &
          self%coarse%strips, .not. self%preconditioner%by_waves, self%threads)
    end subroutine new_normal_work

@@ -93,9 +93,10 @@ contains
       wx = merge(0.0_dp, stencil_c1*coarse%h/grid%dx, grid%nx == 1)
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([stencil_c0 + 2.0_dp*(wx + wy), wx, wy], sp)
-      allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
-      if (.not. self%by_waves) allocate (self%before(grid%nx, grid%rows()), source=0.0_sp)
-      allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1), source=0.0_sp)
+      ! They take no memory before `clear` of module `active_blocks` sets them to zero, with the threads that use them.
+      allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1))
+      if (.not. self%by_waves) allocate (self%before(grid%nx, grid%rows()))
+      allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1))
       call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
       self%image => pair(:, :, 1)
       self%response => pair(:, :, 2)
