@@ -97,8 +97,8 @@ contains
    end subroutine try_changed_pressure
 
    !> Lower the tried direction by a number per block, so that the sum of the trial pressure in each block remains what it
-   !> is if negative pressures become 0. The next direction is formed from the present one as it was. The sums of the blocks of very oblong cells are stiff: if they change, the energy
-   !> rises by much more than the direction gains.
+   !> is if negative pressures become 0. The sums of the blocks of very oblong cells are stiff: if they change, the energy
+   !> rises by much more than the direction gains. The next direction is formed from the present one as it was.
    subroutine keep_block_sums(self, pressure, sums)
       type(normal_work_type), intent(inout) :: self
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())

@@ -12,21 +12,31 @@ module normal_sweeps
    implicit none
    private
 
-   public :: changed_trial_cells, count_cells_below, direction_cells, form_trial_cells, load_cells, longest_cells, lower_cells, &
-      measure_cells, overlap_cells, residual_cells, spread_cells, step_cells, trial_cells, trial_type
+   public :: changed_trial_cells, count_cells_below, direction_cells, form_trial_cells, load_cells, longest_cells, &
+      lower_cells, measure_cells, overlap_cells, residual_cells, spread_cells, step_cells, trial_cells, trial_type
 
    !> A trial pressure and its projection on the admissible pressures, which give the step
    !>     s = factor max(P + alpha (d - offset) - shift, 0) - P
    !> in the cells in which the direction d acts, and s = -P in the others. Neither is stored: each pass that needs them
-   !> computes them from P and d, which takes less time than reading them.
+   !> computes them from P and d, which takes about as long as reading them and saves a field.
    type :: trial_type
       real(dp) :: alpha = 0.0_dp            !! multiple of the direction
       real(dp) :: offset = 0.0_dp           !! to be subtracted from the direction
       real(dp) :: shift = 0.0_dp            !! Pa
       real(dp) :: factor = 1.0_dp
+   contains
+      procedure :: lowered
    end type trial_type
 
 contains
+
+   !> What the trial pressure above the shift lacks to P + alpha d, Pa.
+   pure function lowered(self)
+      class(trial_type), intent(in) :: self
+      real(dp) :: lowered
+
+      lowered = self%alpha*self%offset + self%shift
+   end function lowered
 
    !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere. The residual before is
    !> kept. Other passes assume that a cell is in S if its residual is not 0, so it must not be 0 there.
@@ -133,10 +143,14 @@ contains
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: values(n)
+      real(dp) :: alpha, lowered
       integer :: i
 
+      alpha = trial%alpha
+      lowered = trial%lowered()
+      !$omp simd
       do i = 1, n
-         values(i) = trial_of(trial%alpha, trial%alpha*trial%offset + trial%shift, pressure(i), direction(i))
+         values(i) = trial_of(alpha, lowered, pressure(i), direction(i))
       end do
    end subroutine form_trial_cells
 
@@ -147,13 +161,11 @@ contains
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(in) :: direction(n)
       type(trial_sums_type), intent(inout) :: sums
-      real(dp) :: alpha, lowered, factor
-      real(dp) :: total, cells, lowest, value
+      real(dp) :: alpha, lowered, total, cells, lowest, value
       integer :: i
 
       alpha = trial%alpha
-      lowered = trial%alpha*trial%offset + trial%shift
-      factor = trial%factor
+      lowered = trial%lowered()
       total = 0.0_dp
       cells = 0.0_dp
       lowest = sums%least
@@ -181,14 +193,12 @@ contains
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(inout) :: direction(n)
       type(trial_sums_type), intent(inout) :: sums
-      real(dp) :: alpha, lowered, factor
-      real(dp) :: total, cells, lowest, kept, value
+      real(dp) :: alpha, lowered, total, cells, lowest, kept, value
       real(sp) :: d, inside
       integer :: i
 
       alpha = trial%alpha
-      lowered = trial%alpha*trial%offset + trial%shift
-      factor = trial%factor
+      lowered = trial%lowered()
       total = 0.0_dp
       cells = 0.0_dp
       lowest = sums%least
@@ -218,12 +228,11 @@ contains
       real(dp), intent(inout) :: step(n)
       real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
       type(step_sums_type), intent(inout) :: sums
-      real(dp) :: alpha, lowered, factor
-      real(dp) :: product, square, s
+      real(dp) :: alpha, lowered, factor, product, square, s
       integer :: i
 
       alpha = trial%alpha
-      lowered = trial%alpha*trial%offset + trial%shift
+      lowered = trial%lowered()
       factor = trial%factor
       product = 0.0_dp
       square = 0.0_dp
@@ -239,17 +248,17 @@ contains
       sums%square = sums%square + square
    end subroutine step_cells
 
-   !> Compute lowered = direction - shift where the direction acts. It must not become 0 there.
-   pure subroutine lower_cells(n, shift, direction, lowered)
+   !> Compute below = direction - shift where the direction acts. It must not become 0 there.
+   pure subroutine lower_cells(n, shift, direction, below)
       integer, intent(in) :: n
       real(dp), intent(in) :: shift(n)
       real(sp), intent(in) :: direction(n)
-      real(sp), intent(inout) :: lowered(n)
+      real(sp), intent(inout) :: below(n)
       integer :: i
 
       !$omp simd
       do i = 1, n
-         lowered(i) = acts(direction(i))*(direction(i) - real(shift(i), sp) + tiny(1.0_sp))
+         below(i) = acts(direction(i))*(direction(i) - real(shift(i), sp) + tiny(1.0_sp))
       end do
    end subroutine lower_cells
 
@@ -260,12 +269,11 @@ contains
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: longest
-      real(dp) :: alpha, lowered, factor
-      real(dp) :: fastest, kept
+      real(dp) :: alpha, lowered, factor, fastest, kept
       integer :: i
 
       alpha = trial%alpha
-      lowered = trial%alpha*trial%offset + trial%shift
+      lowered = trial%lowered()
       factor = trial%factor
       fastest = tiny(1.0_dp)
       !$omp simd reduction(max:fastest) private(kept)
@@ -312,12 +320,11 @@ contains
       real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: pressure(n)
       type(state_sums_type), intent(inout) :: sums
-      real(dp) :: alpha, lowered, factor
-      real(dp) :: load, work, touched, cells, distance, p, s, inside
+      real(dp) :: alpha, lowered, factor, load, work, touched, cells, distance, p, s, inside
       integer :: i
 
       alpha = trial%alpha
-      lowered = trial%alpha*trial%offset + trial%shift
+      lowered = trial%lowered()
       factor = trial%factor
       load = 0.0_dp
       work = 0.0_dp
