@@ -93,7 +93,7 @@ contains
       call model_symbols(grid, h, modes(1), symbol, self%model)
       call self%missing%set_symbol(symbol)
       own = self%transform%own_columns()
-      allocate (self%symbol(own(1):own(2), 0:shape%ny/2, 1), source=0.0_sp)
+      allocate (self%symbol(0:shape%ny/2, own(1):own(2), 1), source=0.0_sp)
    end subroutine new_schur_coarse
 
    !> Compute the part of B that the coarse level adds to the stencil, and the sum of both, at its wave vectors.
@@ -170,9 +170,9 @@ contains
       shift = least_shift + contact_shift*taken
       if (abs(taken - self%taken) > 0.0_dp) then
          self%taken = taken
-         do j = 0, ubound(self%model, 2)
-            do i = lbound(self%model, 1), ubound(self%model, 1)
-               self%symbol(i, j, 1) = weight_of(self, self%model(i, j) + shift)
+         do i = lbound(self%model, 1), ubound(self%model, 1)
+            do j = 0, ubound(self%model, 2)
+               self%symbol(j, i, 1) = weight_of(self, self%model(i, j) + shift)
             end do
          end do
       end if

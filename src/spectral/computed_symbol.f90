@@ -27,16 +27,16 @@ contains
    !> one, which complete the last block, have the symbol 0.
    subroutine compute(self, first, symbols)
       class(computed_symbol_type), intent(in) :: self
-      integer, intent(in) :: first                   !! wave number along x of symbols(0, :)
-      real(dp), intent(out) :: symbols(0:, 0:)       !! [block, 0:ny/2], m/Pa
-      real(dp) :: row(0:size(symbols, 1) - 1, 1)
+      integer, intent(in) :: first                   !! wave number along x of symbols(:, 0)
+      real(dp), intent(out) :: symbols(0:, 0:)       !! [0:ny/2, block], m/Pa
+      real(dp) :: row(0:size(symbols, 2) - 1, 1)
       integer :: j, last
 
-      last = min(size(symbols, 1) - 1, self%grid%nx/2 - first)
+      last = min(size(symbols, 2) - 1, self%grid%nx/2 - first)
       do j = 0, self%grid%ny/2
          call self%kernel%grid_row(self%grid, first, j, row(:last, :))
-         symbols(:last, j) = row(:last, 1)/(real(self%grid%nx, dp)*self%grid%ny)
-         symbols(last + 1:, j) = 0.0_dp
+         symbols(j, :last) = row(:last, 1)/(real(self%grid%nx, dp)*self%grid%ny)
+         symbols(j, last + 1:) = 0.0_dp
       end do
    end subroutine compute
 

@@ -86,6 +86,7 @@ contains
       type(c_ptr), intent(in), optional :: memory  !! of another operator, never in use at the same time
       logical, intent(in), optional :: lean        !! no table of the symbol, where that is possible
       type(row_sharing_type), intent(in), optional :: sharing   !! of the rows; absent: that of the grid
+      real(dp), allocatable :: table(:, :, :)
       logical :: tabulated
 
       call check_grid(grid, error)
@@ -101,11 +102,9 @@ contains
       if (present(lean)) tabulated = .not. lean
       if (grid%boundary /= boundary_periodic .or. kernel%components > 1 .or. self%single) tabulated = .true.
       if (.not. tabulated) return
-      call self%symbols%make_room()
-      associate (table => self%symbols)
-         call kernel%symbols(grid, self%mx, self%my, table%values(table%first:table%last, :, :), table%first)
-      end associate
-      call self%symbols%finish()
+      call self%symbols%new_modes(table)
+      call kernel%symbols(grid, self%mx, self%my, table, self%symbols%first)
+      call self%symbols%set(table)
    end subroutine new_convolution
 
    !> Refuse a grid on which there is no operator.
@@ -134,6 +133,7 @@ contains
       type(grid_type), intent(in) :: grid          !! periodic
       type(kernel_type), intent(in) :: kernel      !! what the solid is
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+      real(dp), allocatable :: table(:, :, :)
 
       call check_grid(grid, error)
       call check_poisson(kernel, error)
@@ -142,11 +142,9 @@ contains
       if (allocated(error)) return
       self%grid = grid
       self%kernel = kernel
-      call self%symbols%make_room()
-      associate (table => self%symbols)
-         call kernel%inverse_symbols(grid, table%values(table%first:table%last, :, :), table%first)
-      end associate
-      call self%symbols%finish()
+      call self%symbols%new_modes(table)
+      call kernel%inverse_symbols(grid, table, self%symbols%first)
+      call self%symbols%set(table)
    end subroutine new_inverse_convolution
 
    !> A periodic scalar operator whose symbol, even in both wave numbers, the caller sets for its `modes`.
@@ -172,9 +170,7 @@ contains
       class(convolution_type), intent(inout) :: self
       real(dp), intent(in) :: symbol(:, :)         !! [modes of this process, 0:my/2]
 
-      call self%symbols%make_room()
-      self%symbols%values(self%symbols%first:self%symbols%last, :, 1) = symbol
-      call self%symbols%finish()
+      call self%symbols%set(reshape(symbol, [shape(symbol), 1]))
    end subroutine set_symbol
 
    !> Set the sizes, and make the buffers and plans.

@@ -2,7 +2,8 @@
 !>
 !> A forward and an inverse transform together multiply a field by the number of points. The table holds the
 !> symbols divided by this number, so that no extra pass is needed. A process has the wave numbers along x
-!> of the columns that it transforms. In single precision the symbols are stored divided by a power of two,
+!> of the columns that it transforms. The symbols of a column lie one after the other, because the modes of a block of
+!> columns are multiplied column by column. In single precision the symbols are stored divided by a power of two,
 !> the `unit`, because their own values might be out of range.
 !>
 !> After the table is complete, only the mean mode may change. It is the response to a uniform traction, which
@@ -16,12 +17,13 @@ module symbol_table
 
    public :: new_symbol_table, symbol_table_type
 
+   integer, parameter :: together = 16      !! rows of modes that are turned into columns together
+
    !> The symbols of an operator. The procedures that read or set single modes are for double precision.
    type :: symbol_table_type
       integer :: first = 0                  !! first wave number along x of this process ...
       integer :: last = -1                  !! ... and the last with a symbol; none if it is less
-      !> (first:, 0:my/2, 1) or xx, yy, xy; zero beyond mx/2. It is not allocated before `make_room`,
-      !> nor in single precision.
+      !> (0:my/2, first:, 1) or xx, yy, xy; zero beyond mx/2. It is not allocated before `set`, nor in single precision.
       real(dp), allocatable :: values(:, :, :)
       real(sp), allocatable :: low_values(:, :, :)   !! the same over `unit`, in single precision
       real(dp) :: unit = 1.0_dp
@@ -31,8 +33,8 @@ module symbol_table
       logical, private :: single = .false.
       logical, private :: shared = .false.  !! processes share the columns
    contains
-      procedure :: make_room
-      procedure :: finish
+      procedure :: new_modes
+      procedure :: set
       procedure :: part
       procedure :: self_compliance
       procedure :: mean_mode
@@ -60,28 +62,36 @@ contains
       self%single = single
    end subroutine new_symbol_table
 
-   !> Allocate the values, all zero. The caller fills those from `first` to `last`, and calls `finish`.
-   subroutine make_room(self)
+   !> Make a table of the modes of this process, in which the caller puts the symbols for `set`.
+   pure subroutine new_modes(self, modes)
+      class(symbol_table_type), intent(in) :: self
+      real(dp), allocatable, intent(out) :: modes(:, :, :)   !! (first:last, 0:my/2, 1) or xx, yy, xy
+
+      allocate (modes(self%first:self%last, 0:self%my/2, merge(1, 3, self%components == 1)))
+   end subroutine new_modes
+
+   !> Set the symbols, with the factor of the transforms, and in single precision where the transforms are. Collective.
+   subroutine set(self, modes)
       class(symbol_table_type), intent(inout) :: self
+      real(dp), intent(in) :: modes(self%first:, 0:, :)
+      integer :: c, j
 
-      allocate (self%values(self%first:self%last_column, 0:self%my/2, merge(1, 3, self%components == 1)), &
-         source=0.0_dp)
-   end subroutine make_room
-
-   !> Put the factor of the transforms into the values, and convert them to single precision where the
-   !> transforms are. Collective.
-   subroutine finish(self)
-      class(symbol_table_type), intent(inout) :: self
-
-      self%values = self%values/(real(self%mx, dp)*self%my)
+      allocate (self%values(0:self%my/2, self%first:self%last_column, size(modes, 3)), source=0.0_dp)
+      do c = 1, size(modes, 3)
+         do j = 0, self%my/2, together
+            associate (k => min(j + together - 1, self%my/2))
+               self%values(j:k, self%first:self%last, c) = transpose(modes(:, j:k, c)/(real(self%mx, dp)*self%my))
+            end associate
+         end do
+      end do
       if (.not. self%single) return
       self%unit = maxval(abs(self%values))
       if (self%shared) self%unit = global_max(self%unit)
       self%unit = power_of_two(self%unit)
-      allocate (self%low_values(self%first:self%last_column, 0:self%my/2, size(self%values, 3)))
+      allocate (self%low_values(0:self%my/2, self%first:self%last_column, size(self%values, 3)))
       self%low_values = real(self%values/self%unit, sp)
       deallocate (self%values)
-   end subroutine finish
+   end subroutine set
 
    !> One part of the symbols without the factor of the transforms, in the first quarter of the plane of
    !> wave numbers. This is not available if processes share the columns.
@@ -90,7 +100,7 @@ contains
       integer, intent(in) :: number                !! 1; of a vector operator 1: xx, 2: yy, 3: xy
       real(dp) :: table(0:self%mx/2, 0:self%my/2)  !! m/Pa
 
-      table = self%values(0:self%mx/2, :, number)*(real(self%mx, dp)*self%my)
+      table = transpose(self%values(:, 0:self%mx/2, number))*(real(self%mx, dp)*self%my)
    end function part
 
    !> Displacement of a cell under a unit traction on that cell alone, the mean of both components: the
@@ -106,7 +116,7 @@ contains
       do j = 0, self%my/2
          symbols = 0.0_dp
          do i = self%first, self%last
-            symbols(i) = self%values(i, j, 1) + self%values(i, j, self%components)
+            symbols(i) = self%values(j, i, 1) + self%values(j, i, self%components)
          end do
          ! All columns of a row at once: the sum is in the same order for any number of processes.
          if (self%shared) symbols = global_sum(symbols)
