@@ -23,7 +23,7 @@
 !>
 !> On a large grid, a solve without a given start, or with one for another load, first solves the same problem roughly on
 !> about a quarter of the cells along each side, whose means of the height are a smoother road, and starts from that
-!> pressure (nested iteration). On a very large grid a third grid lies between them.
+!> pressure (nested iteration). From 10 million cells on a third grid lies between them, if the contact is not sparse.
 !>
 !> The solve has converged if the duality gap e1 = (mean gap weighted by the pressure - least gap)/h_rms and the
 !> error of the load are below the tolerance. If the contact is small on a tall
@@ -82,7 +82,7 @@ module normal_cg
       logical :: mixed = .false.                      !! products of steps in single precision
       real(dp) :: coarse_start_from = 4e4_dp          !! cells from which a solve without a start begins on a coarser grid
       real(dp) :: replace_start_from = 5e5_dp         !! the same for a solve with a start that is far away
-      real(dp) :: between_from = 3e7_dp               !! the same for a grid between the two
+      real(dp) :: between_from = 1e7_dp               !! the same for a grid between the two
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
    contains
@@ -257,7 +257,7 @@ contains
    end subroutine solve
 
    !> Replace a start that is missing, or on a large grid one that is far away, by the pressure of a rough solution on a
-   !> coarser grid, if that is worth the effort. On a very large grid whose contact is not sparse, a grid between the two
+   !> coarser grid, if that is worth the effort. On a large grid whose contact is not sparse, a grid between the two
    !> follows. Without it regions of many coarse cells swing between contact and none in several iterations of the large
    !> grid.
    recursive subroutine start_on_coarse_grid(self, task, height, pressure, effort, past)

@@ -57,7 +57,7 @@ module normal_iteration
    ! of a grid from which they save time.
    real(dp), parameter :: large = 1.5e6_dp
    real(dp), parameter :: sizes(6) = [2e4_dp, 1.7e5_dp, large, 4e6_dp, 1.2e7_dp, 3e7_dp]
-   integer, parameter :: steps_before(0:6) = [1, 1, 1, 2, 3, 3, 3]
+   integer, parameter :: steps_before(0:6) = [1, 1, 1, 2, 3, 4, 5]
    integer, parameter :: steps_after(0:6) = [1, 2, 3, 3, 4, 5, 6]
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
    real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
