@@ -239,6 +239,12 @@ contains
       call check_order(index(text, 'tolerance = 1e-6'), '>', 0, 'defaults are shown')
 
       call check_close(fields_of(case), 7.65_dp, 1.0e-9_dp, 'memory: elastic, several rows')
+      in_time = case
+      in_time%grid%nx = 4000
+      in_time%grid%ny = 2500
+      call check_order(memory_needed(in_time), '>', 11.65_dp*8e7_dp, 'memory: a start on half of the cells along each side')
+      in_time%grid%nx = 3990
+      call check_order(memory_needed(in_time), '<', 10.5_dp*8e7_dp, 'memory: a start on a quarter of them')
       case%phases(3)%velocity_y = -1.0_dp
       call check_close(fields_of(case), 12.65_dp, 1.0e-9_dp, 'memory: sliding')
       call check_close(joint_memory(case), 0.0_dp, 0.0_dp, 'memory: nothing more without steady rows and friction')

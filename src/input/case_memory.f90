@@ -30,7 +30,9 @@ module case_memory
    !> Further fields on a path of solutions: three states, the plane across it with two vectors of three numbers per cell
    !> in contact (module `joint_plane`), and the two places between which the road is read.
    real(dp), parameter :: path_fields = 31.0_dp
-   real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg)
+   real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg) ...
+   real(dp), parameter :: start_between = 2.0_dp      !! ... and from one between the two ...
+   real(dp), parameter :: between_from = 1e7_dp       !! ... which a grid of so many cells may have
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
    ! Of a result, bytes, as measured: the file without rows and snapshots, a row of the history, and the groups, names and
@@ -71,7 +73,11 @@ contains
       ! Copies of the pressure and the gap before a row that may be given up (module row_stop). The copies of
       ! friction are counted with its other fields.
       copies = kept_arms(case, cells)
-      if (count_rows(case%phases) > 1 .and. .not. rubs) copies = copies + 16.0_dp*cells
+      if (count_rows(case%phases) > 1 .and. .not. rubs) then
+         copies = copies + 16.0_dp*cells
+         ! If the load jumps, a later solve has a start from coarser grids, too.
+         if (case%grid%cells() >= between_from) copies = copies + 8.0_dp*start_between*cells
+      end if
       ! Gathered chunks, twice as many filtered chunks, and one chunk that each thread is filtering (module
       ! hdf5_chunk_writer).
       buffers = 8.0_dp*(3.0_dp*min(cells, chunks*chunk) + 2.0_dp*min(cells, chunk))
