@@ -18,6 +18,7 @@ module regular_grid
    integer, parameter, public :: boundary_free = 2       !! a patch on an unbounded half-space
 
    real(dp), parameter, public :: block_cells = 8.0_dp   !! cells of a block along a side, if square
+   real(dp), parameter, public :: large_grid = 1e7_dp     !! cells from which a normal contact starts from two coarser grids
 
    real(dp), parameter :: largest_aspect = 16.0_dp   !! largest ratio of a cell's sides for which a stencil is accurate
 

@@ -14,7 +14,7 @@ module case_memory
    use asperity_schedule, only : count_rows
    use case_settings, only : case_type, road_moves
    use hdf5_slabs, only : slab_rows
-   use regular_grid, only : boundary_free
+   use regular_grid, only : boundary_free, large_grid
    implicit none
    private
 
@@ -31,8 +31,7 @@ module case_memory
    !> in contact (module `joint_plane`), and the two places between which the road is read.
    real(dp), parameter :: path_fields = 31.0_dp
    real(dp), parameter :: start_fields = 0.7_dp       !! of a start from a coarser grid (module normal_cg) ...
-   real(dp), parameter :: start_between = 2.0_dp      !! ... and from one between the two ...
-   real(dp), parameter :: between_from = 1e7_dp       !! ... which a grid of so many cells may have
+   real(dp), parameter :: start_between = 2.0_dp      !! ... and from another one between the two, on a large grid
    real(dp), parameter :: most_kept = 64.0e6_dp       !! bytes of the copies of a row that is taken in parts
 
    ! Of a result, bytes, as measured: the file without rows and snapshots, a row of the history, and the groups, names and
@@ -76,7 +75,7 @@ contains
       if (count_rows(case%phases) > 1 .and. .not. rubs) then
          copies = copies + 16.0_dp*cells
          ! If the load jumps, a later solve has a start from coarser grids, too.
-         if (case%grid%cells() >= between_from) copies = copies + 8.0_dp*start_between*cells
+         if (case%grid%cells() >= large_grid) copies = copies + 8.0_dp*start_between*cells
       end if
       ! Gathered chunks, twice as many filtered chunks, and one chunk that each thread is filtering (module
       ! hdf5_chunk_writer).

@@ -35,11 +35,11 @@
 !> precision, and when single precision is no longer useful.
 !>
 !> Memory, in fields of doubles: 6.6 in periodic mode. These are H, P and gap; four fields in single precision (the
-!> direction, and of the preconditioner the residual, that before, and the search direction); the operator's spectrum, whose memory
-!> is also used for two more fields of the preconditioner and, in mixed precision, for the spectrum in single precision;
-!> a quarter for the operator's symbol (an eighth in mixed precision); and 0.4 for blocks and the coarse level. In free
-!> mode spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more
-!> until it is found, and 2.0 with a grid between the two.
+!> direction, and three fields of the preconditioner: the residual, the residual of the iteration before, and the search
+!> direction); the operator's spectrum, whose memory is also used for two more fields of the preconditioner and, in mixed
+!> precision, for the spectrum in single precision; a quarter for the operator's symbol (an eighth in mixed precision);
+!> and 0.4 for blocks and the coarse level. In free mode spectrum and symbol take three (three and a half in mixed
+!> precision). A start from a coarser grid takes 0.7 more until it is found, and 2.0 with a grid between the two.
 module normal_cg
    use coarse_fields, only : coarse_grid, coarsen, refine_pressure
    use contact_solver, only : check_normal_kernel, contact_solver_type
@@ -49,7 +49,7 @@ module normal_cg
    use fft_conv, only : convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
    use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
-      phase_conjugate, phase_ended, phase_restart
+      phase_conjugate, phase_ended, phase_restart, sparse
    use normal_passes, only : as_formed, new_normal_work, normal_work_type, survey, update_state
    use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, fault_of_problem, &
       first_pressure, gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, &
@@ -59,7 +59,7 @@ module normal_cg
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
-   use regular_grid, only : grid_type
+   use regular_grid, only : grid_type, large_grid
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    implicit none
@@ -72,7 +72,6 @@ module normal_cg
    real(dp), parameter :: few_overlap = 8.0_dp        !! coarse cells that a given approach brings into overlap
    real(dp), parameter :: rough_tolerance = 1e-2_dp   !! of its solution: the details belong to the finer grid
    integer, parameter :: most_rough_iterations = 30
-   real(dp), parameter :: sparse = 0.03_dp            !! contact area below which a grid between the two saves no time
    real(dp), parameter :: far_load = 0.05_dp          !! change of the load for which a given start is no better
    real(dp), parameter :: nearly_full = 0.9_dp        !! contact area from which that of full contact is the better start
 
@@ -82,7 +81,7 @@ module normal_cg
       logical :: mixed = .false.                      !! products of steps in single precision
       real(dp) :: coarse_start_from = 4e4_dp          !! cells from which a solve without a start begins on a coarser grid
       real(dp) :: replace_start_from = 5e5_dp         !! the same for a solve with a start that is far away
-      real(dp) :: between_from = 1e7_dp               !! the same for a grid between the two
+      real(dp) :: between_from = large_grid           !! the same for a grid between this one and the coarser one
       type(convolution_type) :: quick                 !! A in single precision, if mixed
       type(normal_work_type), private :: work
    contains
@@ -284,7 +283,7 @@ contains
       if (.not. useful) return
       task%warm = .true.
 
-      if (self%grid%cells() >= self%between_from .and. field_count(rough > 0.0_dp) >= sparse*coarse%cells()) then
+      if (self%grid%cells() >= self%between_from .and. field_count(rough > 0.0_dp) > sparse*coarse%cells()) then
          between = coarse_grid(self%grid, ratio=2)
          allocate (better(between%nx, between%rows()))
          call refine_pressure(coarse, between, rough, self%operator%threads, better)

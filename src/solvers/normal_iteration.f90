@@ -64,7 +64,7 @@ module normal_iteration
    integer, parameter :: least_class = 2          !! of oblong cells and line contacts
    ! A contact that is a part of the grid needs no more steps than a dense one on a smaller grid.
    real(dp), parameter :: light = 0.1_dp, dense = 0.5_dp   !! contact fractions between which the number of steps changes
-   real(dp), parameter :: sparse = 0.03_dp        !! largest contact fraction of a sparse contact
+   real(dp), parameter, public :: sparse = 0.03_dp   !! largest contact fraction of a sparse contact
    integer, parameter :: largest_class = 2        !! of a sparse contact
    integer, parameter :: least_across = 8         !! cells across a free strip for which the model fits
 

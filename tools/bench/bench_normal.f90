@@ -62,7 +62,7 @@ program bench_normal
    problem%target = 0.1_dp*load
    problem%rms_height = field_rms(height, field_mean(height))
 
-   ! So are those of the solver's fields after a solve without a load.
+   ! A solve without a load brings the pages of the solver's own fields into memory, too.
    problem%target = 0.0_dp
    call solver%solve(problem, height, pressure, gap, level, outcome)
    problem%target = 0.1_dp*load
