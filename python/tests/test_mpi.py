@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -222,6 +223,8 @@ def test_other_commands_act_once(tmp_path: Path) -> None:
                           timeout=PATIENCE, check=False)
     assert done.returncode == 0
     assert done.stdout.count("&grid") == 1
+    assert re.search(r"! memory: about \S+ \wB on this machine, \S+ \wB for each of 3 processes",
+                     done.stdout)
     done = subprocess.run([*command, "info", "nothing.h5"], capture_output=True, text=True,
                           timeout=PATIENCE, check=False)
     assert done.returncode == 3

@@ -47,6 +47,7 @@ module regular_grid
       procedure :: strip_start
       procedure :: share_rows
       procedure :: rows_of
+      procedure :: most_rows
       procedure :: column_at
       procedure :: row_at
    end type grid_type
@@ -123,6 +124,21 @@ contains
       strips = int([process, process + 1]*int(blocks(2), int64)/process_count())
       range = [self%strip_start(strips(1) + 1), self%strip_start(strips(2) + 1) - 1]
    end function rows_of
+
+   !> Rows of the process that has most of them, if the processes share the grid.
+   pure integer function most_rows(self)
+      class(grid_type), intent(in) :: self
+      type(grid_type) :: shared
+      integer :: range(2), process
+
+      shared = self
+      call shared%share_rows()
+      most_rows = 0
+      do process = 0, process_count() - 1
+         range = shared%rows_of(process)
+         most_rows = max(most_rows, range(2) - range(1) + 1)
+      end do
+   end function most_rows
 
    !> Column of a place that may lie beyond the grid: a periodic grid repeats its columns; beyond a free grid
    !> there is none, and the result is 0.

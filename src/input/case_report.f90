@@ -1,6 +1,7 @@
 !> A case as text: every resolved setting as a new input, with the time steps and the memory as comments.
 module case_report
    use adhesion_advice, only : adhesion_notes
+   use asperity_parallel, only : process_count, processes_of_machine
    use footprint_advice, only : footprint_note
    use case_settings, only : case_type, phase_settings_type
    use case_time, only : duration_text, seconds_needed
@@ -55,20 +56,14 @@ contains
    function case_summary(case) result(text)
       type(case_type), intent(in) :: case
       character(:), allocatable :: text
-      character(:), allocatable :: whose
-      real(dp) :: limit
 
-      limit = memory_limit(whose)
       text = '! cells of '//to_text(case%grid%dx)//' m by '//to_text(case%grid%dy)//' m'//nl
       text = text//'! '//counted(size(case%phases), 'phase')//', '
       if (any(case%phases%steady)) text = text//counted(count(case%phases%steady), 'steady state')//', '
       text = text//counted(count(case%phases%static .and. .not. case%phases%steady), 'static solve')//', '// &
          counted(sum(case%phases%steps, mask=.not. case%phases%static), 'time step')//' in '// &
          to_text(sum(case%phases%duration))//' s'//nl
-      text = text//'! memory: about '//memory_text(memory_needed(case))//nl
-      text = text//joint_note(case)
-      if (memory_needed(case) > limit) text = text//'! warning: the run needs more memory than '//whose// &
-         ': '//memory_text(limit)//nl
+      text = text//memory_note(case)//joint_note(case)
       text = text//'! result: about '//memory_text(result_size(case))//' with '// &
          counted(most_snapshots(case), 'snapshot')//', before compression'//nl
       text = text//'! time: '//duration_text(seconds_needed(case))//' on this machine, to within a factor of about three'
@@ -78,6 +73,23 @@ contains
       text = text//marked('! ', adhesion_notes(case))// &
          marked('! note: ', footprint_note(case))//marked('! warning: ', case%warnings)
    end function case_summary
+
+   !> The memory that the run takes on this machine, and a warning if the machine has less, as comment lines.
+   function memory_note(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      character(:), allocatable :: whose
+      real(dp) :: each, here, limit
+
+      each = memory_needed(case, case%grid%most_rows())
+      here = processes_of_machine()*each
+      limit = memory_limit(whose)
+      text = '! memory: about '//memory_text(here)
+      if (process_count() > 1) text = text//' on this machine, '//memory_text(each)//' for each of '// &
+         to_text(process_count())//' processes'
+      text = text//nl
+      if (here > limit) text = text//'! warning: the run needs more memory than '//whose//': '//memory_text(limit)//nl
+   end function memory_note
 
    !> What is solved for all cells at once if it must be, the memory that this takes, and what is lost without that
    !> memory, as a comment line. Empty if the case has nothing of this kind.

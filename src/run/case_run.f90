@@ -7,7 +7,7 @@
 !> the first process opens them, and a fault on one process ends all of them with the same message.
 module case_run
    use asperity_errors, only : error_convergence, error_type, fail
-   use asperity_parallel, only : global_max, is_first_process, processes_of_machine, share
+   use asperity_parallel, only : is_first_process, processes_of_machine, share
    use asperity_precision, only : dp
    use asperity_schedule, only : count_rows
    use asperity_simulation, only : new_simulation, simulation_type
@@ -17,7 +17,6 @@ module case_run
    use case_settings, only : case_type
    use memory_limits, only : need_memory
    use process_agreement, only : agree
-   use regular_grid, only : grid_type
    use rising_clock, only : seconds_now
    use run_files, only : run_files_type
    use text_tools, only : add_line, to_text
@@ -90,13 +89,9 @@ contains
    subroutine check_memory(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
-      type(grid_type) :: grid
 
       if (allocated(error)) return
-      grid = case%grid
-      call grid%share_rows()
-      call need_memory(memory_needed(case, nint(global_max(real(grid%rows(), dp)))), 'the run', error, &
-         processes_of_machine())
+      call need_memory(memory_needed(case, case%grid%most_rows()), 'the run', error, processes_of_machine())
       call agree(error)
    end subroutine check_memory
 
