@@ -2,23 +2,12 @@
 !> failures.
 module standard_streams
    use asperity_errors, only : error_file, error_type, fail
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_size_t
+   use, intrinsic :: iso_c_binding, only : c_int, c_size_t
+   use system_calls, only : c_write
    implicit none
    private
 
    public :: say, say_error
-
-   interface
-      !> write(2): the number of bytes written, or -1.
-      function c_write(descriptor, buffer, count) bind(c, name='write') result(written)
-         import :: c_char, c_int, c_size_t
-         implicit none
-         integer(c_int), value :: descriptor
-         character(kind=c_char), intent(in) :: buffer(*)
-         integer(c_size_t), value :: count
-         integer(c_size_t) :: written
-      end function c_write
-   end interface
 
 contains
 

@@ -11,6 +11,7 @@
 module asperity_signals
    use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, &
       c_null_ptr, c_ptr
+   use system_calls, only : action_none, c_signal, signal_file_size
    implicit none
    private
 
@@ -24,8 +25,6 @@ module asperity_signals
    integer(c_int), parameter :: signal_pipe = 13          !! SIGPIPE
    integer(c_int), parameter :: signal_terminate = 15     !! SIGTERM
    integer(c_int), parameter :: signal_time = 24          !! SIGXCPU
-   integer(c_int), parameter :: signal_file_size = 25     !! SIGXFSZ
-   integer(c_intptr_t), parameter :: ignored = 1          !! SIG_IGN
 
    integer, parameter :: most_stops = 8                   !! signals that `catch_stops` takes
    !> Longer than C's `struct sigaction`, which has 152 bytes on Linux, in units of 8 bytes.
@@ -37,12 +36,6 @@ module asperity_signals
    logical, volatile :: asked = .false.
 
    interface
-      type(c_funptr) function c_signal(number, handler) bind(c, name='signal')
-         import :: c_funptr, c_int
-         integer(c_int), value :: number
-         type(c_funptr), value :: handler
-      end function c_signal
-
       function c_raise(number) bind(c, name='raise') result(status)
          import :: c_int
          integer(c_int), value :: number
@@ -68,18 +61,24 @@ contains
    !> Catch the signals from now on. A SIGHUP that is ignored when the program starts stays ignored,
    !> because nohup relies on it.
    subroutine catch_signals()
-      type(c_funptr) :: before, ignore
+      integer(c_intptr_t) :: before
 
-      before = c_signal(signal_interrupt, c_funloc(note_stop))
-      before = c_signal(signal_terminate, c_funloc(note_stop))
-      before = c_signal(signal_time, c_funloc(note_stop))
-      before = c_signal(signal_hang_up, c_funloc(note_stop))
-      if (transfer(before, 0_c_intptr_t) == ignored) before = c_signal(signal_hang_up, before)
-      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux()), c_funloc(note_checkpoint))
-      ignore = transfer(ignored, ignore)
-      before = c_signal(signal_file_size, ignore)
-      before = c_signal(signal_pipe, ignore)
+      before = c_signal(signal_interrupt, address(c_funloc(note_stop)))
+      before = c_signal(signal_terminate, address(c_funloc(note_stop)))
+      before = c_signal(signal_time, address(c_funloc(note_stop)))
+      before = c_signal(signal_hang_up, address(c_funloc(note_stop)))
+      if (before == action_none) before = c_signal(signal_hang_up, before)
+      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux()), address(c_funloc(note_checkpoint)))
+      before = c_signal(signal_file_size, action_none)
+      before = c_signal(signal_pipe, action_none)
    end subroutine catch_signals
+
+   !> The address of a procedure as a number.
+   pure integer(c_intptr_t) function address(procedure)
+      type(c_funptr), intent(in) :: procedure
+
+      address = transfer(procedure, address)
+   end function address
 
    !> Stop the run when the process that started it has ended, if that process has given its number. If another process
    !> is in between, such as a shell script, the run cannot know.
@@ -108,14 +107,14 @@ contains
    !> actions for these signals are saved, and `give_back_stops` restores them.
    subroutine catch_stops(numbers)
       integer(c_int), intent(in) :: numbers(:)
-      type(c_funptr) :: before
+      integer(c_intptr_t) :: before
       integer(c_int) :: status
       integer :: k
 
       caught = 0
       do k = 1, min(size(numbers), most_stops)
          status = c_sigaction(numbers(k), c_null_ptr, c_loc(actions(1, k)))
-         if (status == 0) before = c_signal(numbers(k), c_funloc(note_stop))
+         if (status == 0) before = c_signal(numbers(k), address(c_funloc(note_stop)))
       end do
    end subroutine catch_stops
 

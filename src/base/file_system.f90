@@ -6,6 +6,7 @@ module file_system
    use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
    use asperity_errors, only : error_file, error_type, fail
    use asperity_precision, only : int64
+   use system_calls, only : action_none, c_signal, signal_file_size
    implicit none
    private
 
@@ -13,9 +14,6 @@ module file_system
       folder_of, name_of, is_terminal, let_size_limit_be_an_error
 
    integer(c_int), parameter :: open_read_write = 2     !! O_RDWR of every Unix
-
-   integer(c_int), parameter :: size_limit_signal = 25  !! SIGXFSZ of Linux and macOS
-   integer(c_intptr_t), parameter :: ignore = 1         !! SIG_IGN
 
    interface
       function c_rename(old, new) bind(c, name='rename') result(status)
@@ -54,13 +52,6 @@ module file_system
          integer(c_int), value :: descriptor
          integer(c_int) :: status
       end function c_isatty
-
-      function c_signal(number, action) bind(c, name='signal') result(old)
-         import :: c_int, c_intptr_t
-         integer(c_int), value :: number
-         integer(c_intptr_t), value :: action
-         integer(c_intptr_t) :: old
-      end function c_signal
 
       function c_truncate(descriptor, length) bind(c, name='ftruncate') result(status)
          import :: c_int, c_int64_t
@@ -142,9 +133,9 @@ contains
    !> Make a write beyond the limit on the size of files fail with an error. By default the system would
    !> end the program.
    subroutine let_size_limit_be_an_error()
-      integer(c_intptr_t) :: old
+      integer(c_intptr_t) :: before
 
-      old = c_signal(size_limit_signal, ignore)
+      before = c_signal(signal_file_size, action_none)
    end subroutine let_size_limit_be_an_error
 
    !> Is there a file or folder of this name?

@@ -14,6 +14,11 @@ module process_exchange
 
    public :: exchange, hand_to_first, take_from_first
 
+   ! An exchange of a field takes place in rounds, so that the parcels (the numbers that are sent at once) take little
+   ! memory.
+   integer, parameter, public :: least_parcel = 65536   !! numbers below which a parcel is not divided
+   integer, parameter, public :: most_rounds = 16
+
    !> Send every process its part of an array, and receive the parts that the others have for this one. The
    !> parts lie one after the other in the order of the processes.
    interface exchange

@@ -17,13 +17,13 @@ module trial_process
    use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
    use asperity_errors, only : error_file, error_type, fail
    use asperity_signals, only : on_linux
+   use system_calls, only : action_default, c_exit_at_once, c_signal
    use text_tools, only : to_text
    implicit none
    private
 
    public :: trial_type
 
-   integer(c_intptr_t), parameter :: default_action = 0        !! SIG_DFL
    integer(c_int), parameter :: alarm_signal = 14              !! SIGALRM
    !> Signals for which the runtime library or the host program may have handlers that print:
    !> SIGILL, SIGABRT, SIGBUS (Linux), SIGFPE, SIGBUS (macOS), SIGSEGV, SIGALRM, SIGTERM, SIGINT.
@@ -62,18 +62,6 @@ module trial_process
          integer(c_int), value :: seconds
          integer(c_int) :: left
       end function c_alarm
-
-      function c_signal(number, action) bind(c, name='signal') result(old)
-         import :: c_int, c_intptr_t
-         integer(c_int), value :: number
-         integer(c_intptr_t), value :: action
-         integer(c_intptr_t) :: old
-      end function c_signal
-
-      subroutine c_exit_at_once(status) bind(c, name='_exit')
-         import :: c_int
-         integer(c_int), value :: status
-      end subroutine c_exit_at_once
    end interface
 
 contains
@@ -83,7 +71,7 @@ contains
    subroutine start(self, seconds)
       class(trial_type), intent(inout) :: self
       integer, intent(in) :: seconds
-      integer(c_intptr_t) :: old
+      integer(c_intptr_t) :: before
       integer(c_int) :: left
       integer :: i
 
@@ -91,7 +79,7 @@ contains
       self%is_copy = self%process == 0
       if (.not. self%is_copy) return
       do i = 1, size(signals)
-         old = c_signal(signals(i), default_action)
+         before = c_signal(signals(i), action_default)
       end do
       left = c_alarm(int(seconds, c_int))
    end subroutine start

@@ -7,7 +7,7 @@
 !> or processes.
 module field_columns
    use asperity_parallel, only : process_count, process_number
-   use process_exchange, only : exchange
+   use process_exchange, only : exchange, least_parcel, most_rounds
    use asperity_precision, only : dp, int64
    use regular_grid, only : grid_type
    implicit none
@@ -16,8 +16,6 @@ module field_columns
    public :: column_work_type, work_on_columns
 
    integer, parameter, public :: block = 16     !! columns that are processed together
-   integer, parameter :: most_rounds = 16       !! of an exchange
-   integer, parameter :: least_parcel = 65536   !! numbers below which a parcel is not divided
 
    !> The work on the columns, which an extension of this type defines.
    type, abstract :: column_work_type

@@ -17,7 +17,7 @@
 !> Fetching rows and stating a range are collective: every process must call them, even one that needs no rows.
 module row_halo
    use asperity_parallel, only : gather_rows, process_count, process_number
-   use process_exchange, only : exchange
+   use process_exchange, only : exchange, least_parcel, most_rounds
    use asperity_precision, only : dp, int8, sp
    use regular_grid, only : grid_type
    use row_sharing, only : row_sharing_type, sharing_on_grid
@@ -25,9 +25,6 @@ module row_halo
    private
 
    public :: fetch_beside, fetch_rows, new_range_halo, new_rim_halo, new_row_halo, row_halo_type
-
-   integer, parameter :: least_parcel = 65536       !! fields of fewer numbers are sent in one round
-   integer, parameter :: most_rounds = 16           !! of an exchange, where the parcels are larger
 
    !> The rows of others that a process needs.
    type :: row_halo_type
