@@ -53,6 +53,7 @@ module hdf5_handle
       procedure :: open => open_file
       procedure :: close => close_file
       procedure :: flush => flush_file
+      procedure :: renew => renew_file
       procedure :: report
       procedure :: has_failed
       procedure :: settle
@@ -250,6 +251,27 @@ contains
       if (allocated(fault)) call remember(self, fault)
       call self%settle(fault, error)
    end subroutine flush_file
+
+   !> Close a file and open it again. HDF5 remembers the gaps between the blocks of an open file, and searches all of them
+   !> for each new block. After thousands of objects this search takes most of the time of a run.
+   subroutine renew_file(self, error)
+      class(hdf5_handle_type), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+      type(error_type), allocatable :: fault
+      integer :: identity(2)
+
+      if (allocated(error)) return
+      identity = self%identity
+      call self%close(error)
+      if (allocated(error)) return
+      call open_with_hdf5(self, 'append', fault)
+      if (any(self%identity /= identity)) then
+         self%identity = identity
+         call check_name(self, fault)
+      end if
+      if (allocated(fault)) call remember(self, fault)
+      call self%settle(fault, error)
+   end subroutine renew_file
 
    !> Check that the name still leads to the file that was opened.
    subroutine check_name(self, error)

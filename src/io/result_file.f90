@@ -33,6 +33,9 @@ module result_file
 
    public :: result_file_type, result_plan_type
 
+   integer, parameter :: renewal = 128               !! snapshots after which the file is opened anew
+   integer, parameter :: many_listed = 16            !! snapshots from which on not each new one is listed at once
+
    !> An open result.
    type :: result_file_type
       private
@@ -43,6 +46,7 @@ module result_file
       integer :: compression = 0
       character(:), allocatable :: xdmf_path
       type(result_snapshots_type) :: snapshots
+      integer :: listed = 0                          !! snapshots that the XDMF file lists
       character(:), allocatable, public :: path      !! name of the file
       character(:), allocatable, public :: id        !! identity, which a checkpoint names
       integer, public :: rows = 0                    !! rows of the history
@@ -62,6 +66,7 @@ module result_file
       !> Write rows of the field that was started last.
       generic :: write_rows => write_real_rows, write_state_rows
       procedure :: end_snapshot
+      procedure :: list_snapshots
       procedure :: write_losses
       procedure :: last_snapshot
       procedure :: link_checkpoint
@@ -90,6 +95,7 @@ contains
       self%id = new_id()
       self%xdmf_path = sibling_path(path, '.xdmf')
       call self%snapshots%forget()
+      self%listed = 0
 
       call check_place(self%path, error)
       if (allocated(error)) return
@@ -270,15 +276,27 @@ contains
       call self%file%report(error)
    end subroutine write_state_rows
 
-   !> Let the snapshot appear, in the result and in the XDMF file.
+   !> Let the snapshot appear in the result. It appears in the XDMF file, too, unless that already lists many: the whole
+   !> list is written each time, which would take longer than the run if it were done for each of thousands of snapshots.
    subroutine end_snapshot(self, error)
       class(result_file_type), intent(inout) :: self
       type(error_type), allocatable, intent(out) :: error
 
       call self%writer%finish(self%file)
       call self%snapshots%finish(self%file, self%grid, self%compression, error)
-      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots%written, error)
+      if (modulo(size(self%snapshots%written), renewal) == 0) call self%file%renew(error)
+      if (size(self%snapshots%written) - self%listed > self%listed/many_listed) call self%list_snapshots(error)
    end subroutine end_snapshot
+
+   !> List all snapshots in the XDMF file, if it lacks some.
+   subroutine list_snapshots(self, error)
+      class(result_file_type), intent(inout) :: self
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+
+      if (self%listed == size(self%snapshots%written)) return
+      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots%written, error)
+      if (.not. allocated(error)) self%listed = size(self%snapshots%written)
+   end subroutine list_snapshots
 
    !> Row of the last snapshot; -1 if there is none.
    pure function last_snapshot(self) result(step)
@@ -373,7 +391,8 @@ contains
       end if
       call go_back(self%file, last_step, self%grid, self%expected_rows, self%snapshots%written, error)
       call self%finish(.false., error)
-      call write_xdmf(self%xdmf_path, self%path, self%grid, self%snapshots%written, error)
+      self%listed = -1                ! the list may be older or newer than the result
+      call self%list_snapshots(error)
       self%rows = last_step + 1
       if (allocated(error)) call self%file%close()
    end subroutine reopen_result

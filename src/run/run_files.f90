@@ -313,6 +313,7 @@ contains
          if (len(self%warnings) > 0) call self%result%write_text('run_warnings', self%warnings)
          call self%result%write_text('outcome', outcome)
          call self%result%report(error)            ! the first fault of the two calls above
+         call self%result%list_snapshots(error)
       end if
       call agree(error)
    end subroutine write_outcome

@@ -12,8 +12,8 @@ module normal_sweeps
    implicit none
    private
 
-   public :: changed_trial_cells, count_cells_below, direction_cells, form_trial_cells, load_cells, longest_cells, &
-      lower_cells, measure_cells, overlap_cells, residual_cells, spread_cells, step_cells, trial_cells, trial_type
+   public :: changed_trial_cells, count_acting_cells, count_cells_below, direction_cells, form_trial_cells, load_cells, &
+      longest_cells, lower_cells, measure_cells, overlap_cells, residual_cells, spread_cells, step_cells, trial_cells, trial_type
 
    !> A trial pressure and its projection on the admissible pressures, which give the step
    !>     s = factor max(P + alpha (d - offset) - shift, 0) - P
@@ -59,6 +59,19 @@ contains
          column(i) = column(i) + residual(i)
       end do
    end subroutine residual_cells
+
+   !> Count the cells in which a residual or a direction acts.
+   pure subroutine count_acting_cells(n, values, column)
+      integer, intent(in) :: n
+      real(sp), intent(in) :: values(n)
+      real(sp), intent(inout) :: column(n)          !! numbers over the rows of a block
+      integer :: i
+
+      !$omp simd
+      do i = 1, n
+         column(i) = column(i) + acts(values(i))
+      end do
+   end subroutine count_acting_cells
 
    !> Product of z = M r with the residual before, on the present S.
    pure function overlap_cells(n, length, image, response, correction, residual, before) result(overlap)

@@ -28,6 +28,7 @@ module schur_blocks
       real(dp), private :: mean_stiffness = 0.0_dp   !! that the model adds for the mean of v over the grid
       real(dp), private :: cells = 1.0_dp            !! of the grid
       real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
+      real(dp), allocatable :: coarse_image(:, :) !! coarse part of B v
       real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
       real(dp), allocatable, private :: addition(:, :)   !! coarse part of B d
       ! Sums over the cells of N in each block:
@@ -61,7 +62,7 @@ contains
          allocate (self%pending(nx, first:last), self%correction(nx, first:last), source=0.0_dp)
          allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
          allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
-         allocate (self%search_off(nx, first:last), source=0.0_dp)
+         allocate (self%search_off(nx, first:last), self%coarse_image(nx, first:last), source=0.0_dp)
       end associate
       call new_schur_coarse(self%model, grid, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
@@ -112,6 +113,7 @@ contains
       totals = coarse%block_totals(rows)
       form = coarse%cells*totals(1)
       square = totals(2)
+      self%coarse_image(:, :) = self%pending
    end subroutine image_parts
 
    !> Begin the conjugate gradients. Collective.
@@ -197,6 +199,7 @@ contains
          self%image_off(:, j) = self%image_off(:, j) + length*(self%response_off(:, j) &
             + self%addition(:, j)*self%cells_off(:, j))
          self%pending(:, j) = length*self%addition(:, j)
+         self%coarse_image(:, j) = self%coarse_image(:, j) + self%pending(:, j)
       end do
    end subroutine advance
 

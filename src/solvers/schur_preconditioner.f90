@@ -42,6 +42,7 @@ module schur_preconditioner
    use row_halo, only : new_rim_halo
    use schur_blocks, only : new_schur_blocks
    use schur_coarse, only : om, stencil_c0, stencil_c1
+   use schur_long_waves, only : long_waves_type, new_long_waves
    use schur_passes, only : residual_pass, schur_fields_type, search_pass, step_type
    use schur_release, only : release_pass
    use schur_sweeps, only : response_sums_type
@@ -62,6 +63,7 @@ module schur_preconditioner
       real(dp), private :: form = 0.0_dp                 !! r.M r
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
       type(wave_preconditioner_type) :: waves
+      type(long_waves_type), private :: long_waves
    contains
       procedure :: set_residual
       procedure :: extend
@@ -101,6 +103,7 @@ contains
       self%image => pair(:, :, 1)
       self%response => pair(:, :, 2)
       call new_schur_blocks(self%blocks, grid, coarse, threads, error)
+      if (.not. self%by_waves) call new_long_waves(self%long_waves, grid, coarse, threads, error)
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
 
@@ -144,7 +147,8 @@ contains
    end subroutine extend
 
    !> Release the cells whose trial pressure is negative (module `schur_release`), and extend the residual to them by some
-   !> steps. Afterwards `image`, `response` and the coarse part hold the change of the direction. Collective.
+   !> steps. Afterwards `image`, `response` and the coarse part hold the change of the direction. On a long grid it keeps
+   !> the load of the long waves (module `schur_long_waves`). Collective.
    subroutine release(self, coarse, active, steps, trial, pressure, direction)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -159,7 +163,16 @@ contains
       self%released = .true.
       form = self%form
       call minimise(self, coarse, active, steps, self%sums%square, form)
+      if (keeps_long_waves(self)) call self%long_waves%restore(coarse, active, trial%offset, self%residual, direction, &
+         self%blocks)
    end subroutine release
+
+   !> Must the load of the long waves be kept?
+   pure logical function keeps_long_waves(self)
+      class(schur_preconditioner_type), intent(in) :: self
+
+      keeps_long_waves = self%long_waves%matter .and. self%waves%fixed_load
+   end function keeps_long_waves
 
    !> Reduce v.B v by some steps of conjugate gradients on N. Collective.
    subroutine minimise(self, coarse, active, steps, square_before, form)
@@ -185,7 +198,8 @@ contains
          if (k == 1) first = product
          if (product <= solved*first .or. product <= tiny(1.0_dp)) exit
          step%first = k == 1
-         step%last = k == steps
+         ! The long waves of a step need the sums of the last response, too.
+         step%last = k == steps .and. .not. (self%released .and. keeps_long_waves(self))
          if (k > 1) step%beta = real(product/before, sp)
          before = product
          call self%blocks%form_direction(coarse, real(step%beta, dp))
@@ -220,6 +234,7 @@ contains
       real(dp) :: count
 
       count = self%blocks%model%transforms() + self%waves%transforms()
+      if (self%long_waves%matter) count = count + self%long_waves%transforms()
    end function transforms
 
    !> Free plans and memory.
@@ -228,6 +243,7 @@ contains
 
       call self%blocks%model%destroy()
       call self%waves%destroy()
+      call self%long_waves%destroy()
    end subroutine destroy
 
 end module schur_preconditioner

@@ -1,0 +1,182 @@
+!> Keeps the load of the long waves of a step on a long grid.
+!>
+!> A step consists of the image b = B v on the contact (module `schur_preconditioner`). In the cells outside it b should be
+!> zero. After a few conjugate gradients it is nearly zero there, and what is left of it is not part of the step. The load of
+!> the step along a wave is then wrong by that of this rest. The energy of such an error is proportional to the wavelength.
+!> For the longest wave of all, the uniform pressure, the projection on the given load corrects it. On a grid that is as
+!> long as wide hardly any other wave is long enough to matter. But on a long grid the waves along it are, and without a
+!> correction steps of a rough contact on 4096 x 256 cells raised the energy so often that it took 104 iterations.
+!>
+!> The rest is therefore given to the contact nearby, as a number per block: the load that is missing in each block is
+!> divided by the smoothed number of cells in contact, and smoothed in its turn. The smoothing keeps the sum over the grid,
+!> so that all of the rest arrives in the contact. It spreads over the shorter side of the grid, with a tail that
+!> falls like the displacement beside a load and reaches the contact wherever it is.
+!>
+!> This holds for a given load on a periodic grid only. At a given approach, and on a free grid, what is left outside the
+!> contact changes the load itself, and giving it to the contact made many contacts slower.
+module schur_long_waves
+   use active_blocks, only : active_blocks_type
+   use asperity_errors, only : error_type
+   use asperity_precision, only : dp, pi, sp
+   use asperity_threads, only : least_parallel_cells
+   use coarse_level, only : coarse_level_type
+   use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
+   use normal_sweeps, only : count_acting_cells
+   use regular_grid, only : boundary_periodic, grid_type
+   use schur_blocks, only : schur_blocks_type
+   use transform_shape, only : shape_of_rows
+   implicit none
+   private
+
+   public :: long_waves_type, new_long_waves
+
+   real(dp), parameter :: long = 1.5_dp           !! least ratio of the sides of a long grid
+   real(dp), parameter :: least_share = 1e-6_dp   !! least smoothed share of cells in contact by which a load is divided
+
+   !> The correction. A variable of this type must not be copied.
+   type :: long_waves_type
+      logical :: matter = .false.                      !! the grid is long and periodic
+      integer, private :: threads = 1
+      real(dp), private :: block_size = 1.0_dp         !! cells of a block, on average
+      real(dp), allocatable, private :: cells(:, :)    !! cells of each block, (nx, held rows of blocks)
+      real(dp), allocatable, private :: inside(:, :)   !! those in contact
+      real(dp), allocatable, private :: acting(:, :)   !! those in which the direction acts
+      real(dp), allocatable, private :: missing(:, :)  !! the load that the step lacks, over the area of a cell
+      type(convolution_type), private :: smoother
+   contains
+      procedure :: restore
+      procedure :: transforms
+      procedure :: destroy
+      procedure, private :: smooth
+   end type long_waves_type
+
+contains
+
+   !> Make the correction for the blocks of a grid. Collective.
+   subroutine new_long_waves(self, grid, coarse, threads, error)
+      type(long_waves_type), intent(out) :: self
+      type(grid_type), intent(in) :: grid
+      type(coarse_level_type), intent(in) :: coarse
+      integer, intent(in) :: threads
+      type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
+      integer :: width(coarse%nx), j
+
+      if (allocated(error)) return
+      self%matter = grid%boundary == boundary_periodic .and. min(grid%nx, grid%ny) > 1 .and. &
+         max(grid%lx/grid%ly, grid%ly/grid%lx) >= long
+      if (.not. self%matter) return
+      self%block_size = coarse%cells
+      self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < least_parallel_cells)
+      associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
+         allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last))
+         allocate (self%missing(nx, first:last))
+         width = coarse%last_x - [0, coarse%last_x(:nx - 1)]
+         do j = first, last
+            self%cells(:, j) = real(width*(grid%strip_start(j + 1) - grid%strip_start(j)), dp)
+         end do
+      end associate
+      call new_symbol_operator(self%smoother, shape_of_rows(coarse%nx, coarse%sharing, 1), error, single=.true.)
+      if (.not. allocated(error)) call set_symbols(self, grid, coarse)
+   end subroutine new_long_waves
+
+   !> Compute the symbols of the smoothing: 1/(1 + q/q0), where q0 is the wave number of the shorter side.
+   subroutine set_symbols(self, grid, coarse)
+      type(long_waves_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), allocatable :: symbol(:, :)
+      integer :: i, j, modes(2)
+
+      modes = self%smoother%modes()
+      allocate (symbol(modes(1):modes(2), 0:coarse%ny/2))
+      do j = 0, coarse%ny/2
+         do i = modes(1), modes(2)
+            symbol(i, j) = 1.0_dp/(1.0_dp + min(grid%lx, grid%ly)*hypot(i/grid%lx, j/grid%ly))
+         end do
+      end do
+      call self%smoother%set_symbol(symbol)
+   end subroutine set_symbols
+
+   !> Add what the step lacks in the cells outside the contact to the coarse part of the direction. Collective.
+   subroutine restore(self, coarse, active, offset, residual, direction, blocks)
+      class(long_waves_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      real(dp), intent(in) :: offset                   !! number by which the step lowers the direction
+      real(sp), intent(in) :: residual(0:, 0:)         !! not 0 in contact
+      real(sp), intent(in) :: direction(:, :)          !! before the change, not 0 where it acts
+      type(schur_blocks_type), intent(inout) :: blocks
+      real(dp) :: nearby(coarse%nx, coarse%held(1):coarse%held(2))   !! smoothed numbers of cells in contact
+
+      call count_cells(self, coarse, active, residual, direction)
+      ! The offset is part of the step. Far from the contact b has only its coarse part.
+      self%missing(:, :) = offset*self%acting + blocks%image_off &
+         + (self%cells - self%inside - blocks%cells_off)*blocks%coarse_image
+
+      nearby(:, :) = self%inside
+      call self%smooth(nearby)
+      self%missing(:, :) = self%missing/max(nearby, least_share*coarse%cells)
+      call self%smooth(self%missing)
+      where (self%inside > 0.0_dp) blocks%pending = blocks%pending + self%missing
+   end subroutine restore
+
+   !> Count the cells of each block in contact, and those in which the direction acts.
+   subroutine count_cells(self, coarse, active, residual, direction)
+      type(long_waves_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      real(sp), intent(in) :: residual(0:, 0:), direction(:, :)
+      real(sp) :: inside(size(direction, 1)), acting(size(direction, 1))
+      integer :: j, jb, k
+
+      !$omp parallel do default(none) shared(self, coarse, active, residual, direction) &
+      !$omp private(j, jb, k, inside, acting) schedule(dynamic) num_threads(self%threads)
+      do jb = coarse%strips(1), coarse%strips(2)
+         inside(:) = 0.0_sp
+         acting(:) = 0.0_sp
+         do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
+            do k = 1, active%runs(j)
+               associate (a => active%first(k, j), b => active%last(k, j))
+                  call count_acting_cells(b - a + 1, residual(a:b, j), inside(a:b))
+                  call count_acting_cells(b - a + 1, direction(a:b, j), acting(a:b))
+               end associate
+            end do
+         end do
+         call coarse%sum_blocks(inside, self%inside(:, jb))
+         call coarse%sum_blocks(acting, self%acting(:, jb))
+      end do
+      call coarse%share_blocks(self%inside)
+      call coarse%share_blocks(self%acting)
+   end subroutine count_cells
+
+   !> Smooth numbers per block. Collective.
+   subroutine smooth(self, numbers)
+      class(long_waves_type), intent(inout) :: self
+      real(dp), intent(inout) :: numbers(:, :)
+      integer :: j
+
+      do j = 1, size(numbers, 2)
+         call self%smoother%forward_row(1, j, numbers(:, j))
+      end do
+      call self%smoother%columns(columns_apply)
+      do j = 1, size(numbers, 2)
+         call self%smoother%backward_row(1, j, numbers(:, j))
+      end do
+   end subroutine smooth
+
+   !> Transforms done so far, in units of a transform of the whole grid.
+   pure function transforms(self) result(count)
+      class(long_waves_type), intent(in) :: self
+      real(dp) :: count
+
+      count = self%smoother%ffts/self%block_size
+   end function transforms
+
+   !> Free plans and memory.
+   subroutine destroy(self)
+      class(long_waves_type), intent(inout) :: self
+
+      if (self%matter) call self%smoother%destroy()
+   end subroutine destroy
+
+end module schur_long_waves
