@@ -268,12 +268,15 @@ contains
 
       call product%columns(columns_apply, form)
       form = form/modulus
-      if (form <= 0.0_dp .and. now%free_mean .and. clipped) then
-         ! The step takes the same pressure from all cells, and leaves none: only the clip limits it.
+      if (form <= 0.0_dp .and. now%free_mean) then
+         ! The step takes the same pressure from all cells, which costs no energy: only P >= 0 limits it.
          now%alpha = 1.0_dp
+         if (.not. clipped) now%alpha = longest_multiple(work, pressure)
          now%phase = phase_restart
-         return
-      else if (form <= 0.0_dp) then
+         if (now%alpha < huge(1.0_dp)) return
+      end if
+      if (form <= 0.0_dp) then
+         now%alpha = 0.0_dp
          call end_loop(now, 'no direction of descent is left')
          return
       end if

@@ -115,7 +115,7 @@ contains
       if (task%rms_height <= 0.0_dp) task%rms_height = field_rms(height, field_mean(height))
       determined = .true.
       if (problem%control == control_pressure) then
-         moved = problem%target*max(grid%lx, grid%ly)/problem%modulus
+         moved = problem%target*moved_length(grid)/problem%modulus
       else
          moved = abs(task%target)
          if (grid%boundary == boundary_periodic) determined = problem%target < -mean
@@ -132,6 +132,23 @@ contains
       ! On a flat periodic map the displacement under the load is only round-off.
       if (highest - lowest <= resolved .and. grid%boundary == boundary_periodic) task%least_scale = task%rms_height
    end subroutine prepare_problem
+
+   !> The displacement whose round-off limits the accuracy of the gap, over pressure and compliance, m. On a free grid
+   !> this is the displacement under a uniform pressure. On a periodic one a uniform pressure moves nothing, and the
+   !> round-off of the pressure of each cell acts like an independent load on the cell.
+   pure function moved_length(grid) result(length)
+      type(grid_type), intent(in) :: grid
+      real(dp) :: length
+      real(dp) :: shorter, longer
+
+      shorter = min(grid%lx, grid%ly)
+      longer = max(grid%lx, grid%ly)
+      if (grid%boundary == boundary_periodic) then
+         length = 16.0_dp*max(grid%dx, grid%dy)
+      else
+         length = shorter*(1.0_dp + log(longer/shorter))
+      end if
+   end function moved_length
 
    !> Set the height to which the duality gap is compared, for a state near the solution.
    !>
