@@ -97,6 +97,7 @@ contains
          case ('--overwrite')
             command%overwrite = .true.
          case ('--time-limit')
+            if (command%time_limit > 0.0_dp) call refuse('--time-limit is given twice')
             call take_time_limit()
          case ('--quiet')
             command%quiet = .true.
@@ -106,6 +107,7 @@ contains
             if (allocated(command%output)) call refuse('--output is given twice')
             call take_value(command%output)
          case ('--threads')
+            if (command%threads > 0) call refuse('--threads is given twice')
             call take_threads()
          case default
             call refuse(in_one_line(name, 60)//': there is no such option'//hint(nearest_name(name, options)))
@@ -228,6 +230,8 @@ contains
       if (command%restart .and. command%overwrite) call add_fault(error, error_input, 'asperity: '// &
          '--restart and --overwrite are given together: give one of them')
       if (command%reference .and. command%verb /= 'template') call alien('--reference')
+      if (command%reference .and. command%verb == 'template' .and. allocated(command%path)) call add_fault(error, &
+         error_input, 'asperity: template '//command%path//' --reference: give a name or --reference')
       select case (command%verb)
       case ('run', 'check')
          if (.not. allocated(command%path)) call add_fault(error, error_input, 'asperity: '// &

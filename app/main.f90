@@ -21,12 +21,13 @@ program main
    use asperity_precision, only : dp
    use asperity_progress, only : progress_type
    use result_summary, only : summarise_result
+   use result_target, only : check_place
    use asperity_signals, only : catch_signals, checkpoint_asked, end_with_parent, forget_checkpoint, stop_signal, &
       stop_signal_name
    use standard_streams, only : say, say_error
    use asperity_surface, only : check_files
    use linked_libraries, only : linked_versions
-   use text_tools, only : in_one_line, nearest_name, to_text
+   use text_tools, only : add_line, in_one_line, nearest_name, to_text
    use asperity_version, only : version_number
    use wait_policy, only : wait_passively
    implicit none
@@ -119,10 +120,20 @@ contains
       if (.not. allocated(error) .and. is_first_process()) then
          call refuse_overwriting(case, error)
          if (.not. allocated(error)) call check_files(case%grid, case%surfaces, error)
+         call warn_of_place(case)
          if (.not. allocated(error)) call say(resolved_input(case)//case_summary(case), error)
       end if
       call agree(error)
    end subroutine check
+
+   !> Add a warning if a run could not write its result. The folder may still be made before the run.
+   subroutine warn_of_place(case)
+      type(case_type), intent(inout) :: case
+      type(error_type), allocatable :: fault
+
+      call check_place(trim(case%output%file), fault)
+      if (allocated(fault)) call add_line(case%warnings, '&output: '//fault%message)
+   end subroutine warn_of_place
 
    !> Carry out `asperity info FILE.h5`. A result that is damaged may still have a part that can be described.
    subroutine info(error)

@@ -22,6 +22,7 @@ contains
       if (selected('friction_uphill_and_downhill')) call friction_uphill_and_downhill()
       if (selected('slip_is_along_the_force_on_the_slope')) &
          call slip_is_along_the_force_on_the_slope()
+      if (selected('no_friction_where_a_cell_opens')) call no_friction_where_a_cell_opens()
       if (selected('derivatives_of_the_bound')) call derivatives_of_the_bound()
       if (selected('zero_traction_and_zero_strength')) call zero_traction_and_zero_strength()
       if (selected('fields_return_to_a_new_pressure')) call fields_return_to_a_new_pressure()
@@ -63,6 +64,22 @@ contains
       call check_close(hypot(t(1), t(2)), 0.0_dp, 0.0_dp, 'no traction below -gamma_0/z_0')
    end subroutine bounds_without_slope
 
+   !> On a slope, too, the bound is 0 where the wall bears nothing (P = -p_a), and grows from there like without slope.
+   subroutine no_friction_where_a_cell_opens()
+      type(friction_law_type) :: law
+      real(dp), parameter :: slope(2) = [0.4_dp, -0.3_dp]
+      real(dp), parameter :: across(2) = [0.6_dp, 0.8_dp]   !! along a line of equal height
+      real(dp) :: t(2), s
+
+      law = new_friction_law('coulomb', 0.5_dp, 0.0_dp, 3.0_dp, .true., .true.)
+      s = law%bound_ratio(-3.0_dp, slope, across)
+      call check_close(s, 0.0_dp, 0.0_dp, 'no friction at P = -p_a')
+      s = law%bound_ratio(-2.0_dp, slope, across)
+      call check_close(s, 0.5_dp*sqrt(1.25_dp), 1e-15_dp, 'mu (P + p_a)/N_z')
+      t = law%normal_traction(-2.0_dp, slope) + s*across
+      call check_close(norm2(t - 2.0_dp*slope), s, 1e-15_dp, 'T* holds the attraction')
+   end subroutine no_friction_where_a_cell_opens
+
    !> With slope, the returned traction fulfils the law for the force (T_x, T_y, P), resolved along the true
    !> normal. It is on the right nappe, and on the ray from T*.
    subroutine returned_traction_lies_on_the_cone()
@@ -93,7 +110,7 @@ contains
                force = [t(1), t(2), p]
                push = dot_product(force, normal)
                along = norm2(force - push*normal)
-               push = push + pa*normal(3)
+               push = push + pa/normal(3)
                select case (l)
                case (1)
                   call check_close(along/(mu*push), 1.0_dp, 1e-11_dp, 'Coulomb on the slope')

@@ -9,7 +9,7 @@ module test_schur
    use normal_fixture, only : rough_problem, run_problem, solution_type
    use normal_state, only : control_approach, normal_problem_type
    use kernels, only : normal_half_space
-   use asperity_precision, only : dp, sp
+   use asperity_precision, only : dp, pi, sp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use normal_sweeps, only : trial_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
@@ -45,6 +45,14 @@ contains
       end if
       if (selected('long_grids_take_few_iterations_at_a_given_approach')) &
          call long_grids_take_few_iterations_at_a_given_approach()
+      if (selected('long_grids_take_few_iterations_at_a_given_load')) then
+         call long_grids_take_few_iterations_at_a_given_load(2048, 32)
+         call long_grids_take_few_iterations_at_a_given_load(64, 2000)
+      end if
+      if (selected('an_approach_follows_full_contact')) then
+         call an_approach_follows_full_contact(16, 1)
+         call an_approach_follows_full_contact(12, 15)
+      end if
       if (selected('iterations_stay_few_at_every_load')) call iterations_stay_few_at_every_load()
       if (selected('oblong_cells_take_few_iterations')) then
          call oblong_cells_take_few_iterations(96, 90, 8.0_dp, 24)
@@ -419,6 +427,51 @@ contains
          call check_order(solution%outcome%iterations, '<=', 14, 'few iterations on a long grid')
       end do
    end subroutine long_grids_take_few_iterations_at_a_given_approach
+
+   !> The waves along a long rough grid are long, and a step must not change their load in cells that it releases.
+   subroutine long_grids_take_few_iterations_at_a_given_load(nx, ny)
+      integer, intent(in) :: nx, ny
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution
+      real(dp), allocatable :: h(:, :)
+      real(dp), parameter :: loads(3) = [0.0005_dp, 0.005_dp, 0.05_dp]
+      integer :: k
+
+      grid = new_grid(nx, ny, real(nx, dp), real(ny, dp), boundary_periodic)
+      do k = 1, size(loads)
+         call rough_problem(grid, 4.0_dp, loads(k), problem, h)
+         call run_problem(grid, problem, h, solution)
+         call check_that(solution%outcome%converged, solution%outcome%reason)
+         call check_order(solution%outcome%iterations, '<=', 16, 'few iterations on a long grid under a load')
+      end do
+   end subroutine long_grids_take_few_iterations_at_a_given_load
+
+   !> The mean of a pressure far above that of full contact strains nothing on a periodic grid. The step that takes it away
+   !> ends where the first cell opens.
+   subroutine an_approach_follows_full_contact(nx, ny)
+      integer, intent(in) :: nx, ny
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution, full
+      real(dp), allocatable :: h(:, :)
+      integer :: i
+
+      grid = new_grid(nx, ny, 1.0_dp, real(ny, dp)/nx, boundary_periodic)
+      allocate (h(nx, ny))
+      h(:, :) = spread([(cos(2.0_dp*pi*i/nx), i=1, nx)], 2, ny)
+      problem = normal_problem_type()
+      problem%tolerance = 1e-8_dp
+      problem%target = 1e4_dp
+      call run_problem(grid, problem, h, full)
+      problem%control = control_approach
+      problem%target = -0.5_dp
+      call run_problem(grid, problem, h, solution, start=full%pressure)
+      call check_that(solution%outcome%converged, 'after full contact: '//solution%outcome%reason)
+      call run_problem(grid, problem, h, full)
+      call check_order(maxval(abs(solution%pressure - full%pressure)), '<=', 1e-6_dp*maxval(full%pressure), &
+         'after full contact as without a start')
+   end subroutine an_approach_follows_full_contact
 
    !> On oblong cells the stencil is adapted, and the residual is extended where that is an advantage.
    subroutine oblong_cells_take_few_iterations(nx, ny, aspect, most)

@@ -2,7 +2,7 @@
 
 The tests use nothing of the program. They read the slope of the road under each point from the map
 by the rule of the manual (a cubic spline, or bilinear between central differences). The bound
-follows from the law in three dimensions, |F_t| <= mu (F_n + p_a N_z), where F is the force of the
+follows from the law in three dimensions, |F_t| <= mu F_n, where F is the force of the
 road per area of the road.
 """
 

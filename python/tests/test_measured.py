@@ -688,7 +688,7 @@ def test_crop_keeps_whole_cells(tmp_path):
     surface = load(tmp_path / "map.nc", level="none", crop=(8.0, 30.0, 3.0, 12.0))
     np.testing.assert_allclose(surface.height, 1e-6 * sample()[2:8, 4:15], rtol=1e-14)
     assert (surface.lx, surface.ly) == pytest.approx((22e-6, 9e-6))
-    for crop, words in (((30.0, 8.0, 3.0, 12.0), "along x: must rise"),
+    for crop, words in (((30.0, 8.0, 3.0, 12.0), "along x: the second number must be larger"),
                         ((0.0, 8.0, 3.0, 22.0), "along y: must rise, within 0 to 21"),
                         ((0.0, 1.0, 3.0, 12.0), "too few"), ((0.0, 1.0), "must have 4")):
         with pytest.raises(ValueError, match=words):
@@ -919,6 +919,22 @@ def test_a_pipe_that_nobody_reads_does_not_matter(tmp_path, unbuffered):
         os.close(writing)
         assert (done.returncode, done.stderr) == (0, "")
         assert (tmp_path / name).stat().st_size
+
+
+def test_messages_that_nobody_reads_do_not_matter(tmp_path):
+    """As with `2>&1 | head -1`: the progress of a friction curve goes nowhere, and it goes on."""
+    (tmp_path / "r.nml").write_text(
+        "&material shear_modulus = 1e6, prony_g = 2e6, prony_tau = 1e-2 /\n")
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "asperity", "friction", "self_affine:rms_slope=0.1,hurst=0.8,"
+         "wavelength_long=1e-3,wavelength_short=2e-4", "--material", "r.nml", "--speeds", "0.01",
+         "--pressures", "1e5", "--cells", "32", "--patches", "2", "-o", "q.csv"],
+        cwd=tmp_path, stdout=writing, stderr=writing, check=False)
+    os.close(writing)
+    assert done.returncode == 0
+    assert (tmp_path / "q.csv").read_text().startswith("pressure")
 
 
 def test_every_option_of_the_command_takes_effect(tmp_path, monkeypatch):

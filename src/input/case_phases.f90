@@ -189,7 +189,7 @@ contains
       if (adhesive .or. .not. phase%given .or. phase%control == 'displacement') return
       if (group%bad(trim(phase%control)) .or. phase%target > 0.0_dp) return
       call group%fault(trim(phase%control), 'must be a positive number; 0 or less is allowed with '// &
-         '&adhesion only', faults)
+         '&adhesion only. To lift the rubber off without adhesion, give displacement = 0 or less', faults)
    end subroutine check_load
 
    !> Check settings that exclude or need one another.

@@ -112,7 +112,8 @@ contains
       short_known = known('wavelength_short')
       if (rolloff_known .and. short_known) then
          if (term%wavelength_short > term%wavelength_rolloff) call group%fault('wavelength_short', &
-            'must be at most wavelength_rolloff = '//to_text(term%wavelength_rolloff)// &
+            'must be at most '//trim(merge('wavelength_rolloff', 'wavelength_long   ', group%given('wavelength_rolloff')))// &
+            ' = '//to_text(term%wavelength_rolloff)// &
             default_note('wavelength_short', term%wavelength_short), faults)
       end if
       if (rolloff_known .and. long_known) then

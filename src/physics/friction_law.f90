@@ -9,13 +9,17 @@
 !> For D = T - T* the force normal to the slope is P/N_z + n.D, the force along it
 !> m = sqrt(|D|^2 - (n.D)^2). From T* along D the bound is met at T* + s D:
 !>
-!>     Coulomb          s = F/(m - mu n.D),  F = mu (P/N_z + p_a N_z); no bound if m <= mu n.D
+!>     Coulomb          s = F/(m - mu n.D),  F = mu (P + p_a)/N_z; no bound if m <= mu n.D
 !>     constant shear   s = sigma_max/m
 !>     Coulomb-Orowan   the smaller of the two
 !>
 !> p_a is the attraction at touch, e'(0) of the potential (module `adhesion_potential`): P + p_a is the
 !> pressure of the wall alone in a closed cell, which is not negative and is zero where the cell opens.
 !> The thesis has p_a = gamma_0/z_0, which is e'(0) of its exponential potential.
+!>
+!> The thesis (appendix B) adds p_a N_z to the force normal to the slope instead of p_a/N_z, as for a vertical attraction.
+!> But T* = -P grad H contains the attraction as a force normal to the slope. In a cell that opens, where the wall bears
+!> nothing (P = -p_a), the force F of the thesis would be -mu p_a |grad H|^2 N_z, below zero.
 !>
 !> T is out of bounds where s < 1, and T* + s D is then the traction that is returned to the bound. This is the
 !> admissible root of the quadratic equation of the thesis (eq. 3.10 and B.5), whose other root lies on the second
@@ -124,7 +128,7 @@ contains
 
       root = 1.0_dp
       if (self%slope_effect) root = sqrt(1.0_dp + slope(1)**2 + slope(2)**2)       ! 1/N_z
-      force = self%shear%force(max(p*root + self%adhesive_pressure/root, 0.0_dp), share)
+      force = self%shear%force(max((p + self%adhesive_pressure)*root, 0.0_dp), share)
    end function friction_force
 
    !> The s for which T* + s D lies on the bound under a given force F.
@@ -159,7 +163,7 @@ contains
       do i = 1, n
          root = sqrt(1.0_dp + hx(i)**2 + hy(i)**2)
          bound(i, 2) = 1.0_dp/root
-         bound(i, 1) = max(p(i)*root + self%adhesive_pressure*bound(i, 2), 0.0_dp)
+         bound(i, 1) = max((p(i) + self%adhesive_pressure)*root, 0.0_dp)
       end do
       call self%shear%forces(n, bound(:, 1))
    end subroutine bound_row
@@ -242,7 +246,7 @@ contains
       ddm = (dot_product(v, v) - dot_product(n, v)**2 - dm**2)/m
       mu = self%shear%coefficient
       if (self%shear%strength_beside >= 0.0_dp) then
-         force = self%shear%force(max(p/nz + self%adhesive_pressure*nz, 0.0_dp), [1.0_dp, 1.0_dp])
+         force = self%shear%force(max((p + self%adhesive_pressure)/nz, 0.0_dp), [1.0_dp, 1.0_dp])
          if (ratio(self%shear%strength_beside, m) < ratio(force, m - mu*dot_product(n, d))) mu = 0.0_dp
       end if
       reach = m - mu*dot_product(n, d)

@@ -72,8 +72,9 @@ contains
       consequence = 'the approach can be more than 1 % wrong, and area and pressures depend on the cells'
       if (.not. patches%needed > needed_by_many) &
          consequence = 'the contact area is more than 10 % too large, and approach and pressures depend on the cells'
-      ! The cells are counted in tenths, the factor is rounded up.
-      message = start//tenths(patches%across)//' cells across on average: below '// &
+      ! The cells are counted in whole tenths, so that they are fewer than needed in the message, too; the factor is
+      ! rounded up.
+      message = start//tenths(patches%across - 0.05_dp)//' cells across on average: below '// &
          tenths(patches%needed)//' '//consequence//'; use cells at most 1/'// &
          tenths(patches%needed/patches%across + 0.05_dp)// &
          ' as wide for the same road, if need be on a smaller map around the contact'

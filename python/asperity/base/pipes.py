@@ -1,11 +1,11 @@
-"""Output into a pipe whose reader has ended, as with ``| head -1``."""
+"""Output into a pipe whose reader has ended, as with ``| head -1`` or ``2>&1 | head -1``."""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import Any, TextIO, cast
 
 __all__ = ["patient_output"]
@@ -46,9 +46,10 @@ class _Output:
 @contextmanager
 def patient_output() -> Iterator[None]:
     """Let a command go on, and write its files, when nobody reads its messages any more."""
-    output = _Output(sys.stdout)
-    with redirect_stdout(cast("TextIO", output)):
+    output, messages = _Output(sys.stdout), _Output(sys.stderr)
+    with (redirect_stdout(cast("TextIO", output)), redirect_stderr(cast("TextIO", messages))):
         try:
             yield
         finally:
             output.flush()
+            messages.flush()

@@ -147,10 +147,11 @@ def _persson_applies(run: Run) -> bool:
 
 
 def _is_approach(run: Run) -> bool:
-    """Return whether the last phase prescribes an approach that varies, in free mode."""
-    last = run.history["phase"] == run.history["phase"].max(initial=0)
-    return (run.grid.boundary == "free" and load_of_phases(run)[-1:] == ["displacement"]
-            and bool(np.count_nonzero(last) > 1)
+    """Return whether the last phases prescribe an approach that varies, in free mode."""
+    loads = load_of_phases(run)
+    others = [number for number, load in enumerate(loads, start=1) if load != "displacement"]
+    last = run.history["phase"] > max(others, default=0)
+    return (run.grid.boundary == "free" and bool(np.count_nonzero(last) > 1)
             and float(np.ptp(run.history["displacement"][last])) > 0.0)
 
 
