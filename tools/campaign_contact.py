@@ -5,6 +5,7 @@ python tools/campaign_contact.py extreme 2000       tiny loads, displacements be
 python tools/campaign_contact.py sizes              errors of rough contacts of few cells
 python tools/campaign_contact.py hertz              errors of single contacts of few cells
 python tools/campaign_contact.py oblong             iterations with cells longer than wide
+python tools/campaign_contact.py long               iterations on grids longer than wide
 python tools/campaign_contact.py pull               errors of the pull-off force of spheres
 """
 
@@ -233,11 +234,29 @@ def oblong():
         print(f"cells {ratio} times as long as wide: iterations {', '.join(counts)}")
 
 
+def long():
+    """Print the iterations of rough contacts on grids of a million cells that become longer."""
+    side = 1e-3
+    for ratio in (1, 4, 16, 64, 256):
+        nx, ny = round(1024 * ratio**0.5), round(1024 / ratio**0.5)
+        counts = []
+        for pressure, seed in itertools.product((0.0005, 0.005, 0.05), (1, 2)):
+            height = asperity.surface.self_affine(
+                nx, ny, lx=nx * side, ly=ny * side, hurst=0.5, wavelength_long=ny * side / 2,
+                wavelength_short=6 * side, rms_slope=0.1, seed=seed)
+            try:
+                found = asperity.solve_normal(height, nx * side, ny * side, 1.0, pressure=pressure)
+                counts.append(f"{found.iterations}")
+            except asperity.NotConverged:
+                counts.append("not converged")
+        print(f"{nx} x {ny} cells: iterations {', '.join(counts)}")
+
+
 def main():
     """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong"])
+    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong", "long"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -251,6 +270,8 @@ def main():
         hertz(rng, given.count)
     elif given.what == "oblong":
         oblong()
+    elif given.what == "long":
+        long()
     elif given.what == "normal":
         campaign((normal_problem(rng) for _ in range(given.count)), asperity.solve_normal)
     else:

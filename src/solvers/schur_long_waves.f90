@@ -5,7 +5,8 @@
 !> the step along a wave is then wrong by that of this rest. The energy of such an error is proportional to the wavelength.
 !> For the longest wave of all, the uniform pressure, the projection on the given load corrects it. On a grid that is as
 !> long as wide hardly any other wave is long enough to matter. But on a long grid the waves along it are, and without a
-!> correction steps of a rough contact on 4096 x 256 cells raised the energy so often that it took 104 iterations.
+!> correction many steps of rough contacts raised the energy, so that they took up to ten times as many iterations.
+!> (`python tools/campaign_contact.py long` prints the iterations.)
 !>
 !> The rest is therefore given to the contact nearby, as a number per block: the load that is missing in each block is
 !> divided by the smoothed number of cells in contact, and smoothed in its turn. The smoothing keeps the sum over the grid,
