@@ -31,7 +31,7 @@ module schur_long_waves
 
    public :: long_waves_type, new_long_waves
 
-   real(dp), parameter :: long = 1.5_dp           !! least ratio of the sides of a long grid
+   real(dp), parameter :: long = 3.0_dp           !! least ratio of the sides of a long grid: less gains nothing
    real(dp), parameter :: least_share = 1e-6_dp   !! least smoothed share of cells in contact by which a load is divided
 
    !> The correction. A variable of this type must not be copied.
