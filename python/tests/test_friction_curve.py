@@ -1286,7 +1286,7 @@ def test_options_count_for_all_roads_and_no_road_counts_twice(tmp_path):
         road_of([files[0], str(files[0])], cells=32)
     with pytest.raises(ValueError, match=r"^c\.h5: has the heights of another map"):
         road_of([*files, tmp_path / "c.h5"], cells=32)
-    with pytest.raises(ValueError, match="roads: a ndarray"):
+    with pytest.raises(ValueError, match="roads: is of the type ndarray"):
         road_of([height], cells=32)
 
 
@@ -1429,7 +1429,7 @@ def test_rubbers_that_are_refused(tmp_path, monkeypatch, capsys, material, words
     ([], RUBBER, 32, "roads: none given: must be at least one"),
     (ROAD, 3, 32, "material = 3: must be the name of a file, a Prony or a Compound"),
     (ROAD, None, 32, "material = None: must be the name of a file"),
-    (3, RUBBER, 32, "roads: a int: must be the name of a file"),
+    (3, RUBBER, 32, "roads: is of the type int: must be the name of a file"),
     (ROAD, RUBBER, 1, "cells = 1: must be more than 16 for a side of 0.002 m"),
     (ROAD, RUBBER, 0, "cells = 0: must be a positive integer")])
 def test_wrong_arguments_in_python(tmp_path, roads, material, cells, message):

@@ -689,7 +689,7 @@ def test_crop_keeps_whole_cells(tmp_path):
     np.testing.assert_allclose(surface.height, 1e-6 * sample()[2:8, 4:15], rtol=1e-14)
     assert (surface.lx, surface.ly) == pytest.approx((22e-6, 9e-6))
     for crop, words in (((30.0, 8.0, 3.0, 12.0), "along x: the second number must be larger"),
-                        ((0.0, 8.0, 3.0, 22.0), "along y: must rise, within 0 to 21"),
+                        ((0.0, 8.0, 3.0, 22.0), "along y: must lie within 0 to 21, in the unit"),
                         ((0.0, 1.0, 3.0, 12.0), "too few"), ((0.0, 1.0), "must have 4")):
         with pytest.raises(ValueError, match=words):
             load(tmp_path / "map.nc", crop=crop)

@@ -10,6 +10,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .names import counted
+
 __all__ = ["array_of", "choice", "exactly_one", "instance", "listed", "no_masked", "number",
            "poisson_ratio", "positive", "positives", "shown", "stresses_of", "whole"]
 
@@ -208,7 +210,7 @@ def array_of(
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} = {shown(values)}: must be real numbers") from None
     if ndim is not None and result.ndim != ndim:
-        raise ValueError(f"{name}: has {result.ndim} dimensions, must have {ndim}")
+        raise ValueError(f"{name}: has {counted(result.ndim, 'dimension')}, must have {ndim}")
     bad = ~np.isfinite(result) | (result < low)
     if low_open:
         bad |= result == low

@@ -223,9 +223,9 @@ def _road_source(source: str | Path | MeasuredSurface | Spectrum, options: dict[
             raise ValueError("spectrum: names no file: must be spectrum:FILE")
         return spectrum_of_file(Path(words.partition(":")[2]))
     if not isinstance(source, str | Path):
-        raise ValueError(f"roads: a {type(source).__name__}: must be the name of a file, words such"
-                         " as 'self_affine:...', a MeasuredSurface or a Spectrum; an array becomes"
-                         " a file with asperity.surface.save")
+        raise ValueError(f"roads: is of the type {type(source).__name__}: must be the name of a"
+                         " file, words such as 'self_affine:...', a MeasuredSurface or a Spectrum;"
+                         " an array becomes a file with asperity.surface.save")
     file, own = _own_options(words)
     # Without its mean plane a periodic map would jump at its edges: only the others lose the plane.
     return load(file, **{"level": None, **options, **own})

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.names import counted
 from ..base.tables import (
     Rows,
     cells_of,
@@ -377,8 +378,8 @@ def row_of_numbers(path: Path, line: int, cells: list[str], width: int, first: i
         missing value.
     """
     if len(cells) != width:
-        raise ValueError(f"{path}: line {line}: has {len(cells)} columns, must have {width} as"
-                         f" line {first}")
+        raise ValueError(f"{path}: line {line}: has {counted(len(cells), 'column')}, must have"
+                         f" {width} as line {first}")
     values = []
     for column, cell in enumerate(cells):
         try:

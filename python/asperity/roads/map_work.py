@@ -57,8 +57,8 @@ class MapWork:
                 raise ValueError(f"crop = {low:g}, {high:g} along {name}: the second number must"
                                  " be larger than the first")
             if not -1e-9 * length <= low < high <= length * (1.0 + 1e-9):
-                raise ValueError(f"crop = {low:g}, {high:g} along {name}: must lie within the map,"
-                                 f" 0 to {length:g} m")
+                raise ValueError(f"crop = {low:g}, {high:g} along {name}: must lie within"
+                                 f" 0 to {length:g}, in the unit of the lengths of the map")
             first, last = round(low / cell), round(high / cell)
             if last - first < (2 if dims == 2 else 3):
                 raise ValueError(f"crop = {low:g}, {high:g} along {name}: keeps {last - first}"

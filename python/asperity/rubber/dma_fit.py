@@ -101,8 +101,8 @@ class DmaFit:
             f"arms: {self.material.g.size}, plateau {self.material.g_inf:.4g} Pa, instantaneous"
             f" modulus {self.material.instantaneous_modulus:.4g} Pa",
             f"error (rms of log10 fit/data): storage {self.error_storage:.4f}, loss"
-            f" {self.error_loss:.4f}, tan delta {self.error_tan_delta:.4f}; largest"
-            f" {self.largest_error:.4f}",
+            f" {self.error_loss:.4f}, tan delta {self.error_tan_delta:.4f}",
+            f"largest error of storage and loss: {self.largest_error:.4f}",
             f"valid range: {low:.4g} to {high:.4g} rad/s ({low / (2 * math.pi):.4g} to"
             f" {high / (2 * math.pi):.4g} Hz){at}",
         ]

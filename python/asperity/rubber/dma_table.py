@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.check import choice, poisson_ratio
+from ..base.names import counted
 from ..base.tables import Rows, cells_of, is_number, text_lines
 from .dma_columns import (
     ABSOLUTE_ZERO,
@@ -255,7 +256,8 @@ def _numbers(
     most = max(places.values()) + 1
     for line, cells in body:
         if len(cells) < most:
-            faults.append(f"{path}: line {line}: has {len(cells)} columns, must have {most}")
+            faults.append(f"{path}: line {line}: has {counted(len(cells), 'column')},"
+                          f" must have {most}")
             continue
         for role, at in places.items():
             allowed = "a finite number" if role == "temperature" else "a number > 0"
@@ -272,5 +274,6 @@ def _numbers(
             faults = [*faults[:_MOST_FAULTS], f"{path}: and {more} more"]
         raise ValueError("\n".join(faults))
     if len(body) < 3:
-        raise ValueError(f"{path}: has {len(body)} rows of numbers: must have at least 3")
+        raise ValueError(f"{path}: has {counted(len(body), 'row')} of numbers: must have"
+                         " at least 3")
     return {role: np.array(column) for role, column in values.items()}
