@@ -284,8 +284,8 @@ def test_random_rows_against_dense_matrices(program: str, laws: tuple[str, ...])
      "no solution was found; a larger max_iterations seldom helps, a lower load or coefficient or a"
      " smoother road may"),
     ("law = 'constant_shear', shear_strength = 5e5",
-     "no solution was found, although one exists: law = 'coulomb_orowan' with coefficient = 0.5"
-     " often has one"),
+     "no solution was found, although one exists: with law = 'coulomb_orowan' and coefficient ="
+     " 0.5 a solution is often found"),
 ])
 def test_the_advice_on_rows_without_a_solution(tmp_path, law, message):
     """It says whether a larger limit of iterations helps, and names a coefficient."""

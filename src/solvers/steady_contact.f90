@@ -125,7 +125,8 @@ contains
          'no solution was found; a larger max_iterations seldom helps, a lower load or coefficient or a smoother road may'
       if (law%jumps_at_edge()) then
          outcome%normal%reason = &
-            'no solution was found, although one exists: law = ''coulomb_orowan'' with coefficient = 0.5 often has one'
+            'no solution was found, although one exists: with law = ''coulomb_orowan'' and coefficient = 0.5 '// &
+            'a solution is often found'
       else if (law%slope_effect .and. law%strength_beside() < 0.0_dp) then
          if (field_count(contact%pressure > 0.0_dp .and. law%reach_coefficient()*hypot(contact%slope_x, &
             contact%slope_y) >= 1.0_dp) > 0.0_dp) &
