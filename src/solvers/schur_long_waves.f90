@@ -18,8 +18,7 @@
 module schur_long_waves
    use active_blocks, only : active_blocks_type
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, pi, sp
-   use asperity_threads, only : least_parallel_cells
+   use asperity_precision, only : dp, sp
    use coarse_level, only : coarse_level_type
    use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
    use normal_sweeps, only : count_acting_cells
@@ -67,7 +66,7 @@ contains
          max(grid%lx/grid%ly, grid%ly/grid%lx) >= long
       if (.not. self%matter) return
       self%block_size = coarse%cells
-      self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < least_parallel_cells)
+      self%threads = threads
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
          allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last))
          allocate (self%missing(nx, first:last))
