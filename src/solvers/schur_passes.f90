@@ -26,6 +26,11 @@ module schur_passes
 
    public :: add_blocks, residual_pass, schur_fields_type, search_pass, step_type
 
+   !> Value of v beside the edge of a free grid, over that at the edge. Beyond it the solid goes on without pressure, as in
+   !> N, and v falls with the distance; in the stencil alone by half per cell. With 0 or 1 instead, contacts that reach the
+   !> edge take more iterations.
+   real(sp), parameter :: beyond = 0.75_sp
+
    integer, parameter :: together = 16            !! rows of blocks of a portion, at most
    integer, parameter :: portions_of_thread = 8   !! at least, if there are enough rows of blocks
 
@@ -82,7 +87,7 @@ contains
       end do
       !$omp end do
       !$omp single
-      call self%rim%close_rim(self%residual)
+      call close_field(self, self%residual)
       !$omp end single
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
@@ -179,7 +184,7 @@ contains
       end do
       !$omp end do
       !$omp single
-      call self%rim%close_rim(self%search)
+      call close_field(self, self%search)
       !$omp end single
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
@@ -303,14 +308,31 @@ contains
       if (self%length > 0.0_sp) row => self%response(:, j)
    end function response_row
 
-   !> Repeat the ends of a row of a periodic field in its rim.
+   !> Set the cells beside the ends of a row: those of the other end on a periodic grid, else a part of those at the edge.
    pure subroutine close_row(self, row)
       class(schur_fields_type), intent(in) :: self
       real(sp), intent(inout) :: row(0:)
 
-      if (self%grid%boundary /= boundary_periodic) return
-      row(0) = row(self%grid%nx)
-      row(self%grid%nx + 1) = row(1)
+      if (self%grid%boundary == boundary_periodic) then
+         row(0) = row(self%grid%nx)
+         row(self%grid%nx + 1) = row(1)
+      else
+         row(0) = beyond*row(1)
+         row(self%grid%nx + 1) = beyond*row(self%grid%nx)
+      end if
    end subroutine close_row
+
+   !> The same for the rows before the first and behind the last one. Collective.
+   subroutine close_field(self, field)
+      class(schur_fields_type), intent(in) :: self
+      real(sp), intent(inout) :: field(0:, 0:)
+
+      call self%rim%close_rim(field)
+      associate (grid => self%grid, last => self%grid%rows())
+         if (grid%boundary == boundary_periodic .or. last == 0) return
+         if (grid%first_row == 1) field(:, 0) = beyond*field(:, 1)
+         if (grid%last_row == grid%ny) field(:, last + 1) = beyond*field(:, last)
+      end associate
+   end subroutine close_field
 
 end module schur_passes
