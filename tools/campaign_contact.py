@@ -256,7 +256,8 @@ def main():
     """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong", "long"])
+    parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong",
+                                         "long"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
