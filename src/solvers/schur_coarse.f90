@@ -13,6 +13,9 @@
 !> The shift grows with the part of the grid that is not in N: the coarse functions are cut off there,
 !> which would make their eigenvalues too large without it.
 !>
+!> On a free grid the transforms are twice as long, with zeros beyond the map: its opposite sides are not neighbours, and a
+!> contact may be moved by waves longer than the map.
+!>
 !> Processes may share the rows of blocks. Each then holds the numbers of its own rows, and the symbols of the
 !> wave numbers that it transforms.
 !>
@@ -26,6 +29,7 @@ module schur_coarse
    use regular_grid, only : grid_type
    use row_column_single, only : new_row_column, row_column_type
    use row_sharing, only : row_sharing_type
+   use influence, only : transform_length
    use transform_shape, only : shape_of_rows, transform_shape_type
    implicit none
    private
@@ -44,6 +48,7 @@ module schur_coarse
    type :: schur_coarse_type
       real(dp), private :: cells = 1.0_dp                !! cells of a block
       real(dp), private :: blocks = 1.0_dp               !! number of blocks
+      real(dp), private :: points = 1.0_dp               !! points of the transforms
       logical, private :: shared = .false.               !! other processes hold the other rows of blocks
       integer, private :: threads = 1
       real(dp), allocatable, private :: powers(:)        !! w for each number of cells of N in a block, from 0
@@ -75,11 +80,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(transform_shape_type) :: shape
       real(dp), allocatable :: symbol(:, :)
+      real(dp) :: sides(2)
       integer :: own(2), modes(2), most, k
 
       shape = shape_of_rows(blocks_x, sharing, 1)
+      shape%mx = transform_length(shape%nx, grid%boundary)
+      shape%my = transform_length(shape%ny, grid%boundary)
       self%shared = shape%shared
       self%blocks = real(shape%nx, dp)*shape%ny
+      self%points = real(shape%mx, dp)*shape%my
       self%cells = grid%cells()/self%blocks
       most = (grid%nx/shape%nx + 1)*(grid%ny/shape%ny + 1)
       allocate (self%powers(0:most), source=[((k/self%cells)**power, k=0, most)])
@@ -89,16 +98,18 @@ contains
       if (.not. allocated(error)) call new_row_column(self%transform, shape, self%threads, error)
       if (allocated(error)) return
       modes = self%missing%modes()
-      allocate (symbol(modes(1):modes(2), 0:shape%ny/2), self%model(modes(1):modes(2), 0:shape%ny/2))
-      call model_symbols(grid, h, modes(1), symbol, self%model)
+      allocate (symbol(modes(1):modes(2), 0:shape%my/2), self%model(modes(1):modes(2), 0:shape%my/2))
+      sides = [grid%lx*shape%mx/shape%nx, grid%ly*shape%my/shape%ny]
+      call model_symbols(grid, sides, h, modes(1), symbol, self%model)
       call self%missing%set_symbol(symbol)
       own = self%transform%own_columns()
-      allocate (self%symbol(0:shape%ny/2, own(1):own(2), 1), source=0.0_sp)
+      allocate (self%symbol(0:shape%my/2, own(1):own(2), 1), source=0.0_sp)
    end subroutine new_schur_coarse
 
    !> Compute the part of B that the coarse level adds to the stencil, and the sum of both, at its wave vectors.
-   pure subroutine model_symbols(grid, h, first, missing, model)
+   pure subroutine model_symbols(grid, sides, h, first, missing, model)
       type(grid_type), intent(in) :: grid
+      real(dp), intent(in) :: sides(2)                 !! of the transforms, m
       real(dp), intent(in) :: h                        !! side of a cell, m
       integer, intent(in) :: first                     !! wave number along x of the first column
       real(dp), intent(out) :: missing(first:, 0:), model(first:, 0:)
@@ -109,8 +120,8 @@ contains
       q_least = pi*h/max(merge(0.0_dp, grid%lx, grid%nx == 1), merge(0.0_dp, grid%ly, grid%ny == 1), h)
       do j = 0, ubound(missing, 2)
          do i = first, ubound(missing, 1)
-            qx = 2.0_dp*pi*i*h/grid%lx
-            qy = 2.0_dp*pi*j*h/grid%ly
+            qx = 2.0_dp*pi*i*h/sides(1)
+            qy = 2.0_dp*pi*j*h/sides(2)
             q = max(hypot(qx, qy), q_least)
             model(i, j) = stencil(qx, qy)
             if (q < band) model(i, j) = q*(of_long_waves + (at_band - of_long_waves)*(q/band)**2)
@@ -187,7 +198,7 @@ contains
       real(dp), intent(in) :: stiffness
       real(sp) :: weight
 
-      weight = real(max(1.0_dp/stiffness - om, 0.0_dp)/self%blocks, sp)
+      weight = real(max(1.0_dp/stiffness - om, 0.0_dp)/self%points, sp)
    end function weight_of
 
    !> Compute the coarse part of W p from the sums of p over the cells of N in the blocks. Collective.
