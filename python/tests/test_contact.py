@@ -74,6 +74,27 @@ def test_rough_contact_is_complementary_and_balanced():
     np.testing.assert_allclose(contact.displacement_z, response, atol=1e-9 * np.ptp(height))
 
 
+@pytest.mark.parametrize("seed", [0, 1])
+def test_long_grid_of_oblong_cells(seed):
+    """A strip a hundred times as long as wide, whose cells are fifteen times as long as wide."""
+    nx, ny, dy = 1187, 143, 0.068
+    q = 2 * np.pi * np.hypot(np.fft.fftfreq(ny, dy)[:, None], np.fft.rfftfreq(nx)[None, :])
+    inverse = np.divide(1.0, q, out=np.zeros_like(q), where=q > 0)
+    noise = np.random.default_rng(seed).standard_normal((ny, nx))
+    spectrum = np.fft.rfft2(noise) * np.where(q < 0.93 * np.pi, inverse**1.7, 0.0)
+    slope = np.fft.irfft2(1j * q * spectrum, s=(ny, nx)).std()
+    height = 0.1 / slope * np.fft.irfft2(spectrum, s=(ny, nx))
+    contact = asperity.solve_normal(height, nx, ny * dy, 1.0, pressure=0.067)
+    assert contact.iterations < 200
+
+    pressure = contact.pressure
+    gap = np.fft.irfft2(2.0 * inverse * np.fft.rfft2(pressure), s=(ny, nx)) - height
+    gap -= (pressure * gap).sum() / pressure.sum()
+    assert pressure.min() >= 0.0
+    assert pressure.mean() == pytest.approx(0.067, rel=1e-6)
+    assert gap.min() >= -2e-6 * height.std()
+
+
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 @pytest.mark.parametrize("method", ["fast", "thesis"])
 @pytest.mark.parametrize("displacement", [0.0, -1e-5])

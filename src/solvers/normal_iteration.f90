@@ -10,8 +10,9 @@
 !> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
-!> There are directions of another kind: plain ones, those of very oblong cells, and those on a free strip of few cells
-!> across, whose compliance is not that of a half-space. No cells are released for them, and alpha comes from a prediction
+!> There are directions of another kind: plain ones, those of very oblong cells, those on a free strip of few cells
+!> across, whose compliance is not that of a half-space, and all later ones of a solve in which several trials with released
+!> cells in a row did not lower the energy: the model then misleads, as on long grids of oblong cells. No cells are released for them, and alpha comes from a prediction
 !> of d.A d on the block means, which the ratio kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
@@ -46,6 +47,7 @@ module normal_iteration
    ! trial shorter.
    real(dp), parameter :: shortening = 4.0_dp
    real(dp), parameter :: often_shortened = 1e3_dp   !! kappa from which the direction is the plain residual
+   real(dp), parameter :: misled = 50.0_dp           !! kappa from which no more cells are released in this solve
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to reduce the energy
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
@@ -74,6 +76,7 @@ module normal_iteration
    type :: iteration_type
       integer :: phase = phase_restart      !! how the next direction is formed
       logical :: preconditioned = .false.   !! the present direction is not a plain one
+      logical :: may_release = .true.       !! steps with released cells have not failed too often
       logical :: releases = .false.         !! the cells with a negative trial pressure are released
       logical :: free_mean = .false.        !! the load is not given, and a uniform pressure strains nothing
       integer :: class = 0                  !! place in the lists of steps
@@ -133,7 +136,7 @@ contains
       call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
       work%preconditioner%waves%fixed_load = fixed_load
-      now%releases = model_fits(work)
+      now%releases = now%may_release .and. model_fits(work)
       now%class = size_class(work%grid, measure%contact)
       steps = merge(steps_before(now%class), steps_alone(now%class), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
@@ -252,6 +255,10 @@ contains
       else
          now%kappa = shortening*now%kappa
          now%phase = merge(phase_plain, phase_restart, now%kappa > often_shortened)
+         if (now%kappa > misled .and. now%releases) then
+            now%may_release = .false.
+            now%kappa = 1.0_dp
+         end if
       end if
    end subroutine shorten
 
