@@ -11,9 +11,10 @@
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
 !> There are directions of another kind: plain ones, those of very oblong cells, those on a free strip of few cells
-!> across, whose compliance is not that of a half-space, and all later ones of a solve in which several trials with released
-!> cells in a row did not lower the energy: the model then misleads, as on long grids of oblong cells. No cells are released for them, and alpha comes from a prediction
-!> of d.A d on the block means, which the ratio kappa of the last true product to its prediction corrects.
+!> across, whose compliance is not that of a half-space, and all later ones of a solve in which several trials with
+!> released cells in a row did not lower the energy: the model then misleads, as on long grids of oblong cells. No cells
+!> are released for them, and alpha comes from a prediction of d.A d on the block means, which the ratio kappa of the last
+!> true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
