@@ -63,6 +63,8 @@ CASES = {
         "pressure = 0.005", "displacement = 0.004"),
     "rough, oblong cells": "&grid nx = 256, ny = 96, lx = 1.0, ly = 1.0 /"
     + ROUGH.format(short=0.08, pressure=0.005),
+    "rough, long grid": "&grid nx = 1536, ny = 48, lx = 32.0, ly = 1.0 /"
+    + ROUGH.format(short=0.125, pressure=0.05),
     "rough, free": "&grid nx = 128, ny = 128, lx = 1.0, boundary = 'free' /"
     + ROUGH.format(short=16 / 128, pressure=0.005),
     "line contact": "&grid nx = 2048, ny = 1, lx = 1.0 /"
