@@ -204,7 +204,7 @@ contains
       call apply(s, r, inside, 40, z, form)
       z = merge(z, 0.0_dp, inside)
       trial = trial_type(alpha=2.0_dp/maxval(abs(z)), offset=0.05_dp*maxval(abs(z)))
-      s%preconditioner%waves%fixed_load = .false.
+      s%preconditioner%fixed_load = .false.
       call release(s, 40, trial, inside, z, released, found)
       call check_that(all(released .eqv. (inside .and. 1.0_dp + trial%alpha*(z - trial%offset) < 0.0_dp)), &
          'cells with a negative trial pressure are released')
@@ -242,7 +242,7 @@ contains
          call apply(s, r, inside, 1, z, form)
          z = merge(z, 0.0_dp, inside)
          trial = trial_type(alpha=2.0_dp/maxval(abs(z)), offset=sum(z)/count(inside))
-         s%preconditioner%waves%fixed_load = k == 1
+         s%preconditioner%fixed_load = k == 1
          call release(s, 1, trial, inside, z, released, found)
          step = merge(trial%alpha*(found - trial%offset), 0.0_dp, inside)
          where (released) step = -1.0_dp

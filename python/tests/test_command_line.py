@@ -1,6 +1,7 @@
 """The program as a user meets it: commands, messages, exit statuses and faulty inputs."""
 
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -63,6 +64,20 @@ def test_values_without_effect_are_reported(program, folder, old, new, printed):
     assert done.returncode == 0
     assert done.out.count("has no effect") == (1 if printed else 0)
     assert f"! warning: {printed}" in done.out or not printed
+
+
+@pytest.mark.skipif(shutil.which("readelf") is None, reason="needs readelf")
+def test_the_program_needs_no_text_relocations(program):
+    """Hardened systems refuse to load such programs."""
+    done = subprocess.run(["readelf", "-d", program], capture_output=True, text=True, check=True)
+    assert "TEXTREL" not in done.stdout
+
+
+def test_a_folder_that_does_not_exist_is_reported(program, folder):
+    """The folder may still be made before the run, so that this is a warning."""
+    done = check(program, folder, GOOD + "&output file = 'nowhere/a.h5' /\n")
+    assert done.returncode == 0
+    assert "nowhere/a.h5: cannot be written: there is no folder" in done.out
 
 
 @pytest.mark.parametrize(("phase", "law", "printed"), [
@@ -134,6 +149,9 @@ def test_help(program, verb):
         (["run", "a.nml", "--threads", "two"], "--threads two"),
         (["run", "a.nml", "--threads=99999999999"], "--threads 99999999999"),
         (["run", "a.nml", "--quiet=yes"], "--quiet takes no value"),
+        (["run", "a.nml", "--threads", "1", "--threads=2"], "--threads is given twice"),
+        (["run", "a.nml", "--time-limit", "9", "--time-limit", "8"], "--time-limit is given twice"),
+        (["template", "hertz", "--reference"], "give a name or --reference"),
         (["info", "a.h5", "--restart"], "--restart is not an option of info"),
         (["check", "a.nml", "--output", "x.h5"], "--output is not an option of check"),
         (["template", "herz"], "did you mean hertz?"),

@@ -74,6 +74,18 @@ def test_rough_contact_is_complementary_and_balanced():
     np.testing.assert_allclose(contact.displacement_z, response, atol=1e-9 * np.ptp(height))
 
 
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
+def test_the_reported_error_is_that_of_the_gap(tolerance):
+    """A large load around a deep hole must not be taken for round-off of the gap."""
+    height = np.zeros((60, 2048))
+    height[30, 700:704] = -1e3
+    contact = asperity.solve_normal(height, 2048, 60, 1.0, pressure=200, tolerance=tolerance)
+    assert 0.99 < contact.contact_area < 1.0
+    gap = contact.displacement_z - height
+    level = (contact.pressure * gap).sum() / contact.pressure.sum()
+    assert level - gap.min() <= 1.01 * tolerance * height.std()
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 def test_long_grid_of_oblong_cells(seed):
     """A strip a hundred times as long as wide, whose cells are fifteen times as long as wide."""

@@ -406,6 +406,19 @@ def pull_off(tmp_path_factory):
     return asperity.run(case)
 
 
+def test_the_overview_of_a_pull_off_in_static_phases(tmp_path):
+    (tmp_path / "sphere.nml").write_text("""
+        &grid nx = 16, ny = 16, lx = 30e-6, boundary = 'free' /
+        &surface shape = 'sphere', radius = 50e-6 /
+        &material shear_modulus = 1e6 /
+        &phase force = 1e-6 /
+        &phase displacement = 4e-7 /
+        &phase displacement = 2e-7 /
+        """)
+    run = asperity.run(tmp_path / "sphere.nml")
+    assert run.overview().axes[2].get_title() == "Force against approach"
+
+
 def test_the_load_of_a_free_contact_is_a_force(pull_off):
     """The size of the grid is arbitrary in free mode, and so is the mean pressure."""
     force = pull_off.history["pressure"] * 30e-6**2

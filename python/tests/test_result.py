@@ -101,6 +101,26 @@ def test_snapshots_and_losses_of_rows_that_were_not_read(tmp_path):
     assert film(run, tmp_path / "film.gif", "pressure").stat().st_size > 0
 
 
+def test_many_snapshots_are_all_listed(tmp_path):
+    """The list of snapshots is not rewritten for each of them, and the file is opened anew."""
+    (tmp_path / "a.nml").write_text(
+        "&grid nx = 4, ny = 1, lx = 1e-3 /\n&surface shape = 'sine', amplitude = 1e-6,"
+        " wavelength = 1e-3 /\n&material shear_modulus = 1e6 /\n&output snapshot_every = 1 /\n"
+        "&phase pressure = 1e3, duration = 1, steps = 299, velocity_x = 1e-4 /\n")
+    listed = []
+
+    def look(_row, _sim):
+        listed.append((tmp_path / "a.xdmf").read_text().count("<Time"))
+
+    run = asperity.run(tmp_path / "a.nml", callback=look)
+    assert len(run.snapshots) == 300
+    assert [snapshot.step for snapshot in run.snapshots] == list(range(300))
+    assert (tmp_path / "a.xdmf").read_text().count("<Time") == 300
+    assert listed[10] >= 10
+    assert listed[-1] >= 280
+    assert len(set(listed)) < 100
+
+
 def test_reprs_say_what_is_there(result):
     run = asperity.open(result)
     assert "Sample" in repr(run)

@@ -9,9 +9,9 @@
 !> would find their results in use. It therefore gives its process number to a run (`ASPERITY_PARENT`), which
 !> stops, as after SIGTERM, when its parent is another process.
 module asperity_signals
-   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_intptr_t, c_loc, &
+   use, intrinsic :: iso_c_binding, only : c_funloc, c_funptr, c_int, c_int64_t, c_loc, &
       c_null_ptr, c_ptr
-   use system_calls, only : action_none, c_signal, signal_file_size
+   use system_calls, only : action_none, c_signal, in_place_of_procedure, signal_file_size
    implicit none
    private
 
@@ -61,24 +61,17 @@ contains
    !> Catch the signals from now on. A SIGHUP that is ignored when the program starts stays ignored,
    !> because nohup relies on it.
    subroutine catch_signals()
-      integer(c_intptr_t) :: before
+      type(c_funptr) :: before
 
-      before = c_signal(signal_interrupt, address(c_funloc(note_stop)))
-      before = c_signal(signal_terminate, address(c_funloc(note_stop)))
-      before = c_signal(signal_time, address(c_funloc(note_stop)))
-      before = c_signal(signal_hang_up, address(c_funloc(note_stop)))
-      if (before == action_none) before = c_signal(signal_hang_up, before)
-      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux()), address(c_funloc(note_checkpoint)))
-      before = c_signal(signal_file_size, action_none)
-      before = c_signal(signal_pipe, action_none)
+      before = c_signal(signal_interrupt, c_funloc(note_stop))
+      before = c_signal(signal_terminate, c_funloc(note_stop))
+      before = c_signal(signal_time, c_funloc(note_stop))
+      before = c_signal(signal_hang_up, c_funloc(note_stop))
+      if (transfer(before, action_none) == action_none) before = c_signal(signal_hang_up, before)
+      before = c_signal(merge(signal_user_linux, signal_user_other, on_linux()), c_funloc(note_checkpoint))
+      before = c_signal(signal_file_size, in_place_of_procedure(action_none))
+      before = c_signal(signal_pipe, in_place_of_procedure(action_none))
    end subroutine catch_signals
-
-   !> The address of a procedure as a number.
-   pure integer(c_intptr_t) function address(procedure)
-      type(c_funptr), intent(in) :: procedure
-
-      address = transfer(procedure, address)
-   end function address
 
    !> Stop the run when the process that started it has ended, if that process has given its number. If another process
    !> is in between, such as a shell script, the run cannot know.
@@ -107,14 +100,14 @@ contains
    !> actions for these signals are saved, and `give_back_stops` restores them.
    subroutine catch_stops(numbers)
       integer(c_int), intent(in) :: numbers(:)
-      integer(c_intptr_t) :: before
+      type(c_funptr) :: before
       integer(c_int) :: status
       integer :: k
 
       caught = 0
       do k = 1, min(size(numbers), most_stops)
          status = c_sigaction(numbers(k), c_null_ptr, c_loc(actions(1, k)))
-         if (status == 0) before = c_signal(numbers(k), address(c_funloc(note_stop)))
+         if (status == 0) before = c_signal(numbers(k), c_funloc(note_stop))
       end do
    end subroutine catch_stops
 

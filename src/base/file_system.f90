@@ -3,10 +3,10 @@
 !> A procedure with the argument `error` does nothing if an error is already set. Several of them may therefore be
 !> called in sequence, and the error is checked once, after the last call.
 module file_system
-   use, intrinsic :: iso_c_binding, only : c_char, c_int, c_int64_t, c_intptr_t, c_null_char
+   use, intrinsic :: iso_c_binding, only : c_char, c_funptr, c_int, c_int64_t, c_null_char
    use asperity_errors, only : error_file, error_type, fail
    use asperity_precision, only : int64
-   use system_calls, only : action_none, c_signal, signal_file_size
+   use system_calls, only : action_none, c_signal, in_place_of_procedure, signal_file_size
    implicit none
    private
 
@@ -133,9 +133,9 @@ contains
    !> Make a write beyond the limit on the size of files fail with an error. By default the system would
    !> end the program.
    subroutine let_size_limit_be_an_error()
-      integer(c_intptr_t) :: before
+      type(c_funptr) :: before
 
-      before = c_signal(signal_file_size, action_none)
+      before = c_signal(signal_file_size, in_place_of_procedure(action_none))
    end subroutine let_size_limit_be_an_error
 
    !> Is there a file or folder of this name?

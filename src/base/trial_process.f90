@@ -14,10 +14,10 @@
 !> must neither print nor use OpenMP nor MPI, and it ends without the exit handlers of the program. If no
 !> copy can be made, there is no trial.
 module trial_process
-   use, intrinsic :: iso_c_binding, only : c_int, c_intptr_t
+   use, intrinsic :: iso_c_binding, only : c_funptr, c_int
    use asperity_errors, only : error_file, error_type, fail
    use asperity_signals, only : on_linux
-   use system_calls, only : action_default, c_exit_at_once, c_signal
+   use system_calls, only : action_default, c_exit_at_once, c_signal, in_place_of_procedure
    use text_tools, only : to_text
    implicit none
    private
@@ -71,7 +71,7 @@ contains
    subroutine start(self, seconds)
       class(trial_type), intent(inout) :: self
       integer, intent(in) :: seconds
-      integer(c_intptr_t) :: before
+      type(c_funptr) :: before
       integer(c_int) :: left
       integer :: i
 
@@ -79,7 +79,7 @@ contains
       self%is_copy = self%process == 0
       if (.not. self%is_copy) return
       do i = 1, size(signals)
-         before = c_signal(signals(i), action_default)
+         before = c_signal(signals(i), in_place_of_procedure(action_default))
       end do
       left = c_alarm(int(seconds, c_int))
    end subroutine start

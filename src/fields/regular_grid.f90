@@ -20,6 +20,7 @@ module regular_grid
    real(dp), parameter, public :: block_cells = 8.0_dp   !! cells of a block along a side, if square
    real(dp), parameter, public :: large_grid = 1e7_dp     !! cells from which a normal contact starts from two coarser grids
 
+   real(dp), parameter :: long = 4.0_dp              !! least ratio of the sides of a long grid
    real(dp), parameter :: largest_aspect = 16.0_dp   !! largest ratio of a cell's sides for which a stencil is accurate
 
    !> Cell (i, j), from 0, has its centre at x = i dx, y = j dy.
@@ -43,6 +44,7 @@ module regular_grid
       procedure :: cell_area
       procedure :: cell_side
       procedure :: very_oblong
+      procedure :: is_long
       procedure :: blocks
       procedure :: strip_start
       procedure :: share_rows
@@ -210,6 +212,13 @@ contains
 
       very_oblong = min(self%nx, self%ny) > 1 .and. max(self%dx, self%dy) > largest_aspect*min(self%dx, self%dy)
    end function very_oblong
+
+   !> Is the grid so much longer than wide that waves along it need care?
+   pure logical function is_long(self)
+      class(grid_type), intent(in) :: self
+
+      is_long = max(self%lx, self%ly) >= long*min(self%lx, self%ly)
+   end function is_long
 
    !> Number of rows that this process holds.
    pure function rows(self)

@@ -136,7 +136,7 @@ contains
       if (now%free_mean) stiffness = mean_stiffness(work, 1.0_dp - measure%contact, pressure)
       call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
-      work%preconditioner%waves%fixed_load = fixed_load
+      work%preconditioner%fixed_load = fixed_load
       now%releases = now%may_release .and. model_fits(work)
       now%class = size_class(work%grid, measure%contact)
       steps = merge(steps_before(now%class), steps_alone(now%class), now%releases)

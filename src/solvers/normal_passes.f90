@@ -25,7 +25,6 @@ module normal_passes
    !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
    !> inverse compliance of an open cell that is surrounded by cells in contact.
    real(dp), parameter :: of_open_cells = 2.0_dp
-   real(dp), parameter :: long = 4.0_dp        !! length over width of a long grid
    real(dp), parameter :: stiffer = 5.0_dp     !! factor on the stiffness that the block means predict
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
@@ -191,7 +190,7 @@ contains
 
       cells = self%grid%cells()
       stiffness = of_open_cells/max(open_part, 1.0_dp/cells)
-      if (max(self%grid%lx, self%grid%ly) < long*min(self%grid%lx, self%grid%ly)) return
+      if (.not. self%grid%is_long()) return
       call take_contact(self, pressure)
       associate (coarse => self%coarse)
          form = coarse%predict_form((1.0_dp - open_part)*cells)

@@ -21,6 +21,9 @@ module normal_state
    integer, parameter, public :: control_approach = 2   !! U - H where the gap is zero is prescribed
 
    real(dp), parameter :: round_off = 256.0_dp*epsilon(1.0_dp)   !! of a pressure, over the mean one in the contact
+   !> Cell sides in the displacement of round-off on a periodic grid: well above the errors of random grids under loads far
+   !> above full contact.
+   real(dp), parameter :: cell_sides = 16.0_dp
    real(dp), parameter :: shallow = 10.0_dp             !! largest scale over the displacement under the load
 
    !> A normal contact problem without its fields.
@@ -144,7 +147,7 @@ contains
       shorter = min(grid%lx, grid%ly)
       longer = max(grid%lx, grid%ly)
       if (grid%boundary == boundary_periodic) then
-         length = 16.0_dp*max(grid%dx, grid%dy)
+         length = min(cell_sides*max(grid%dx, grid%dy), longer)
       else
          length = shorter*(1.0_dp + log(longer/shorter))
       end if

@@ -20,7 +20,7 @@ module schur_long_waves
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, sp
    use coarse_level, only : coarse_level_type
-   use fft_conv, only : columns_apply, convolution_type, new_symbol_operator
+   use fft_conv, only : convolution_type, new_symbol_operator
    use normal_sweeps, only : count_acting_cells
    use regular_grid, only : boundary_periodic, grid_type
    use schur_blocks, only : schur_blocks_type
@@ -30,7 +30,6 @@ module schur_long_waves
 
    public :: long_waves_type, new_long_waves
 
-   real(dp), parameter :: long = 3.0_dp           !! least ratio of the sides of a long grid: less gains nothing
    real(dp), parameter :: least_share = 1e-6_dp   !! least smoothed share of cells in contact by which a load is divided
 
    !> The correction. A variable of this type must not be copied.
@@ -41,13 +40,11 @@ module schur_long_waves
       real(dp), allocatable, private :: cells(:, :)    !! cells of each block, (nx, held rows of blocks)
       real(dp), allocatable, private :: inside(:, :)   !! those in contact
       real(dp), allocatable, private :: acting(:, :)   !! those in which the direction acts
-      real(dp), allocatable, private :: missing(:, :)  !! the load that the step lacks, over the area of a cell
       type(convolution_type), private :: smoother
    contains
       procedure :: restore
       procedure :: transforms
       procedure :: destroy
-      procedure, private :: smooth
    end type long_waves_type
 
 contains
@@ -62,14 +59,12 @@ contains
       integer :: width(coarse%nx), j
 
       if (allocated(error)) return
-      self%matter = grid%boundary == boundary_periodic .and. min(grid%nx, grid%ny) > 1 .and. &
-         max(grid%lx/grid%ly, grid%ly/grid%lx) >= long
+      self%matter = grid%boundary == boundary_periodic .and. min(grid%nx, grid%ny) > 1 .and. grid%is_long()
       if (.not. self%matter) return
       self%block_size = coarse%cells
       self%threads = threads
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
          allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last))
-         allocate (self%missing(nx, first:last))
          width = coarse%last_x - [0, coarse%last_x(:nx - 1)]
          do j = first, last
             self%cells(:, j) = real(width*(grid%strip_start(j + 1) - grid%strip_start(j)), dp)
@@ -106,18 +101,18 @@ contains
       real(sp), intent(in) :: residual(0:, 0:)         !! not 0 in contact
       real(sp), intent(in) :: direction(:, :)          !! before the change, not 0 where it acts
       type(schur_blocks_type), intent(inout) :: blocks
-      real(dp) :: nearby(coarse%nx, coarse%held(1):coarse%held(2))   !! smoothed numbers of cells in contact
+      real(dp), dimension(coarse%nx, coarse%held(1):coarse%held(2)) :: missing, nearby, smoothed
 
       call count_cells(self, coarse, active, residual, direction)
-      ! The offset is part of the step. Far from the contact b has only its coarse part.
-      self%missing(:, :) = offset*self%acting + blocks%image_off &
+      ! What the step lacks, summed over the cells of a block. The offset is part of the step. Far from the contact b has
+      ! only its coarse part.
+      missing(:, :) = offset*self%acting + blocks%image_off &
          + (self%cells - self%inside - blocks%cells_off)*blocks%coarse_image
 
-      nearby(:, :) = self%inside
-      call self%smooth(nearby)
-      self%missing(:, :) = self%missing/max(nearby, least_share*coarse%cells)
-      call self%smooth(self%missing)
-      where (self%inside > 0.0_dp) blocks%pending = blocks%pending + self%missing
+      call self%smoother%apply(self%inside, nearby)
+      missing(:, :) = missing/max(nearby, least_share*coarse%cells)
+      call self%smoother%apply(missing, smoothed)
+      where (self%inside > 0.0_dp) blocks%pending = blocks%pending + smoothed
    end subroutine restore
 
    !> Count the cells of each block in contact, and those in which the direction acts.
@@ -148,21 +143,6 @@ contains
       call coarse%share_blocks(self%inside)
       call coarse%share_blocks(self%acting)
    end subroutine count_cells
-
-   !> Smooth numbers per block. Collective.
-   subroutine smooth(self, numbers)
-      class(long_waves_type), intent(inout) :: self
-      real(dp), intent(inout) :: numbers(:, :)
-      integer :: j
-
-      do j = 1, size(numbers, 2)
-         call self%smoother%forward_row(1, j, numbers(:, j))
-      end do
-      call self%smoother%columns(columns_apply)
-      do j = 1, size(numbers, 2)
-         call self%smoother%backward_row(1, j, numbers(:, j))
-      end do
-   end subroutine smooth
 
    !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)

@@ -59,6 +59,7 @@ module schur_preconditioner
    type, extends(schur_fields_type) :: schur_preconditioner_type
       logical :: by_waves = .false.                      !! cells are so oblong that M r comes from `waves`
       logical :: released = .false.                      !! the fields hold the change after a release
+      logical :: fixed_load = .true.                     !! the load is given, not the approach
       real(dp) :: compliance = 0.0_dp                    !! typical eigenvalue of M A, m/Pa
       real(dp), private :: form = 0.0_dp                 !! r.M r
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
@@ -136,6 +137,7 @@ contains
       self%length = 0.0_sp
       self%released = .false.
       if (self%by_waves) then
+         self%waves%fixed_load = self%fixed_load
          call self%waves%apply(coarse, self%residual, self%search, self%image, self%blocks%pending, form, &
             self%overlap)
          return
@@ -171,7 +173,7 @@ contains
    pure logical function keeps_long_waves(self)
       class(schur_preconditioner_type), intent(in) :: self
 
-      keeps_long_waves = self%long_waves%matter .and. self%waves%fixed_load
+      keeps_long_waves = self%long_waves%matter .and. self%fixed_load
    end function keeps_long_waves
 
    !> Reduce v.B v by some steps of conjugate gradients on N. Collective.
@@ -233,8 +235,7 @@ contains
       class(schur_preconditioner_type), intent(in) :: self
       real(dp) :: count
 
-      count = self%blocks%model%transforms() + self%waves%transforms()
-      if (self%long_waves%matter) count = count + self%long_waves%transforms()
+      count = self%blocks%model%transforms() + self%waves%transforms() + self%long_waves%transforms()
    end function transforms
 
    !> Free plans and memory.
