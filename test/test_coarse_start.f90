@@ -26,6 +26,7 @@ contains
          call the_solution_is_the_same(new_grid(250, 1, 1.0_dp, 1.0_dp, boundary_periodic))
       end if
       if (selected('short_waves_survive')) call short_waves_survive()
+      if (selected('pressure_grows_towards_the_edge')) call pressure_grows_towards_the_edge()
       if (selected('linear_fields_are_exact')) call linear_fields_are_exact()
       if (selected('a_given_past_counts')) call a_given_past_counts()
       if (selected('it_saves_transforms')) call it_saves_transforms()
@@ -60,6 +61,44 @@ contains
       call check_that(count(refined > 0.0_dp) == (fine%nx - 4)*fine%ny, 'the cells of a coarse cell are free')
       call check_that(all(refined(9:12, :) <= 0.0_dp), 'those of the coarse cell without pressure')
    end subroutine short_waves_survive
+
+   !> The pressure of a punch grows towards the edge of a free map, and refining it keeps this.
+   subroutine pressure_grows_towards_the_edge()
+      type(grid_type) :: fine, coarse
+      real(dp), allocatable :: rough(:, :), refined(:, :), exact(:, :)
+
+      fine = new_grid(96, 64, 1.5_dp, 1.0_dp, boundary_free)
+      coarse = coarse_grid(fine)
+      allocate (exact(fine%nx, fine%ny), refined(fine%nx, fine%ny), rough(coarse%nx, coarse%ny))
+      exact = punch(fine)
+      call coarsen(fine, coarse, exact, 1, rough)
+      call refine_pressure(coarse, fine, rough, 1, refined)
+      call check_that(maxval(abs(refined/exact - 1.0_dp)) < 0.05_dp, &
+         'the pressure of a punch is wrong by the part '//to_text(maxval(abs(refined/exact - 1.0_dp))))
+   end subroutine pressure_grows_towards_the_edge
+
+   !> Mean over each cell of 1/sqrt(x (lx - x) y (ly - y)).
+   pure function punch(grid) result(pressure)
+      type(grid_type), intent(in) :: grid
+      real(dp) :: pressure(grid%nx, grid%ny)
+      integer :: i, j
+
+      do j = 1, grid%ny
+         do i = 1, grid%nx
+            pressure(i, j) = mean(real(i - 1, dp)/grid%nx, real(i, dp)/grid%nx)*mean(real(j - 1, dp)/grid%ny, real(j, dp)/grid%ny)
+         end do
+      end do
+
+   contains
+
+      !> Mean of 1/sqrt(s (1 - s)), whose integral is 2 arcsin(sqrt(s)).
+      pure real(dp) function mean(from, to)
+         real(dp), intent(in) :: from, to
+
+         mean = 2.0_dp*(asin(sqrt(to)) - asin(sqrt(from)))/(to - from)
+      end function mean
+
+   end function punch
 
    !> Solve with a start from a coarser grid, or without.
    subroutine run_from(coarse, grid, problem, height, solution, mixed, past, start, between)

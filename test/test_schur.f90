@@ -9,7 +9,7 @@ module test_schur
    use normal_fixture, only : rough_problem, run_problem, solution_type
    use normal_state, only : control_approach, normal_problem_type
    use kernels, only : normal_half_space
-   use asperity_precision, only : dp, pi, sp
+   use asperity_precision, only : dp, int64, pi, sp
    use regular_grid, only : boundary_free, boundary_periodic, grid_type, new_grid
    use normal_sweeps, only : trial_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
@@ -36,6 +36,12 @@ contains
          call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp)
          call preconditioner_is_the_schur_complement(boundary_periodic, 23, 17, 1.5_dp, mean_stiffness=4.0_dp)
          call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
+      end if
+      if (selected('residual_is_extended_beyond_a_free_map')) call residual_is_extended_beyond_a_free_map()
+      if (selected('contacts_at_the_edge_take_few_iterations')) then
+         call contacts_at_the_edge_take_few_iterations(0.05_dp, 4e-3_dp)
+         call contacts_at_the_edge_take_few_iterations(0.5_dp, 1e-1_dp)
+         call contacts_at_the_edge_take_few_iterations(0.8_dp, 1.0_dp)
       end if
       if (selected('search_reaches_cells_far_from_a_small_contact')) call search_reaches_cells_far_from_a_small_contact()
       if (selected('a_given_approach_makes_only_the_mean_stiff')) call a_given_approach_makes_only_the_mean_stiff()
@@ -77,21 +83,24 @@ contains
    end subroutine run_schur
 
    !> Make a preconditioner, and its model B as a dense matrix.
-   subroutine new_setting(s, grid, b, mean_stiffness)
+   subroutine new_setting(s, grid, b, mean_stiffness, beyond)
       type(setting_type), intent(out), target :: s
       type(grid_type), intent(in) :: grid
       real(dp), allocatable, intent(out) :: b(:, :)
       real(dp), intent(in), optional :: mean_stiffness   !! at a given approach
+      integer, intent(in), optional :: beyond            !! blocks beyond the edges; default: none
       type(error_type), allocatable :: error
       real(dp) :: unit(grid%nx*grid%ny), form
-      integer :: i
+      integer :: i, more
 
+      more = 0
+      if (present(beyond)) more = beyond
       s%grid = grid
-      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
+      call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error, beyond=more)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .true., 1)
+      call new_active_blocks(s%active, s%grid, s%coarse, .true., 1)
       allocate (s%memory(grid%nx, grid%ny))
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), size(s%memory, kind=int64), error)
       call check_no_error(error, 'a preconditioner')
       if (present(mean_stiffness)) call s%preconditioner%blocks%stiffen_mean(mean_stiffness)
       allocate (b(size(unit), size(unit)))
@@ -141,6 +150,89 @@ contains
       call s%preconditioner%destroy()
       call s%coarse%destroy()
    end subroutine preconditioner_is_the_schur_complement
+
+   !> The solid goes on beyond a free map: M r, also after a release of cells, is the Schur complement of the model on the map
+   !> with its margin.
+   subroutine residual_is_extended_beyond_a_free_map()
+      integer, parameter :: nx = 24, ny = 16, rim = 8
+      type(setting_type), target :: s, outer
+      type(trial_type) :: trial
+      real(dp), allocatable :: b(:, :), of_map(:, :), r(:), z(:), wide_z(:), v(:), wanted(:), exact(:), found(:)
+      logical, allocatable :: inside(:), wide(:), released(:), wide_released(:)
+      integer, allocatable :: on(:), off(:)
+      real(dp) :: form
+      integer :: i, n, wide_n
+
+      n = nx*ny
+      wide_n = (nx + 2*rim)*(ny + 2*rim)
+      call new_setting(outer, new_grid(nx + 2*rim, ny + 2*rim, (nx + 2*rim)/1.0_dp, (ny + 2*rim)/1.0_dp, boundary_free), b)
+      call new_setting(s, new_grid(nx, ny, nx/1.0_dp, ny/1.0_dp, boundary_free), of_map, beyond=1)
+      inside = [(modulo(7*i*i + 3*i, 11) < 7, i=1, n)]
+      r = merge([(sin(1.7_dp*i) + 0.3_dp, i=1, n)], 0.0_dp, inside)
+      wide = widened(merge(1.0_dp, 0.0_dp, inside)) > 0.0_dp
+      on = pack([(i, i=1, wide_n)], wide)
+      off = pack([(i, i=1, wide_n)], .not. wide)
+      allocate (z(n))
+      call apply(s, r, inside, 60, z, form)
+      associate (right => widened(r))
+         exact = matmul(b(on, on), right(on)) - matmul(b(on, off), solved(b(off, off), matmul(b(off, on), right(on))))
+      end associate
+      found = pack(z, inside)
+      call check_order(norm2(found - exact), '<=', 1e-3_dp*norm2(exact), 'the Schur complement with cells beyond the map')
+      call check_close(form, dot_product(pack(r, inside), exact), 1e-4_dp*form, 'and its energy')
+
+      z = merge(z, 0.0_dp, inside)
+      trial = trial_type(alpha=2.0_dp/maxval(abs(z)), offset=0.05_dp*maxval(abs(z)))
+      s%preconditioner%fixed_load = .false.
+      call release(s, 60, trial, inside, z, released, found)
+      wide_z = widened(z)
+      wide_released = widened(merge(1.0_dp, 0.0_dp, released)) > 0.0_dp
+      on = pack([(i, i=1, wide_n)], wide .and. .not. wide_released)
+      off = pack([(i, i=1, wide_n)], .not. wide .or. wide_released)
+      wanted = merge(trial%offset - 1.0_dp/trial%alpha, 0.0_dp, wide_released)
+      associate (right => widened(r))
+         v = solved(b(off, off), wanted(off) - matmul(b(off, on), right(on)))
+         exact = matmul(b(on, on), right(on)) + matmul(b(on, off), v)
+      end associate
+      found = pack(found, inside .and. .not. released)
+      call check_order(count(released), '>=', n/20, 'cells are released')
+      call check_order(norm2(found - exact), '<=', 2e-3_dp*norm2(exact), 'the direction on the rest of the contact')
+      call s%preconditioner%destroy()
+      call s%coarse%destroy()
+      call outer%preconditioner%destroy()
+      call outer%coarse%destroy()
+
+   contains
+
+      !> A field of the map with zeros beyond it.
+      pure function widened(field) result(whole)
+         real(dp), intent(in) :: field(:)
+         real(dp) :: whole(wide_n)
+         real(dp) :: cells(1 - rim:nx + rim, 1 - rim:ny + rim)
+
+         cells(:, :) = 0.0_dp
+         cells(1:nx, 1:ny) = reshape(field, [nx, ny])
+         whole = reshape(cells, [wide_n])
+      end function widened
+
+   end subroutine residual_is_extended_beyond_a_free_map
+
+   !> A rough contact that reaches the edge of a free map takes about as many iterations as a periodic one.
+   subroutine contacts_at_the_edge_take_few_iterations(least, load)
+      real(dp), intent(in) :: least                  !! fraction of the cells that touch, at least
+      real(dp), intent(in) :: load                   !! mean pressure over the modulus
+      type(grid_type) :: grid
+      type(normal_problem_type) :: problem
+      type(solution_type) :: solution
+      real(dp), allocatable :: h(:, :)
+
+      grid = new_grid(160, 131, 1.0_dp, 131.0_dp/160.0_dp, boundary_free)
+      call rough_problem(grid, 8.0_dp, load, problem, h)
+      call run_problem(grid, problem, h, solution)
+      call check_that(solution%outcome%converged, solution%outcome%reason)
+      call check_order(count(solution%pressure > 0.0_dp)/grid%cells(), '>=', least, 'the contact is large')
+      call check_order(solution%outcome%iterations, '<=', 12, 'and takes few iterations')
+   end subroutine contacts_at_the_edge_take_few_iterations
 
    !> The residual of a small contact on a line has no part on the coarse level. Far from it the search direction is exactly
    !> 0 in the first steps, but these cells belong to N and have to be reached by the next ones.
@@ -271,11 +363,11 @@ contains
       pressure = reshape(merge(1.0_dp, 0.0_dp, inside), shape(pressure))
       before = real(reshape(z, shape(before)), sp)
       call s%preconditioner%release(s%coarse, s%active, steps, trial, pressure, before)
-      do jb = 1, s%coarse%ny
+      do jb = s%coarse%strips(1), s%coarse%strips(2)
          do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1
-            change(:, j) = s%preconditioner%image(:, j) + s%preconditioner%correction(s%coarse, jb)
+            change(:, j) = s%preconditioner%image(1:s%grid%nx, j) + s%preconditioner%correction(s%coarse, jb)
             if (s%preconditioner%length > 0.0_sp) &
-               change(:, j) = change(:, j) + s%preconditioner%length*s%preconditioner%response(:, j)
+               change(:, j) = change(:, j) + s%preconditioner%length*s%preconditioner%response(1:s%grid%nx, j)
          end do
       end do
       direction = z + reshape(change, [size(z)])
@@ -321,9 +413,9 @@ contains
       s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse%first_y, s%coarse%strips, .false., 1)
+      call new_active_blocks(s%active, s%grid, s%coarse, .false., 1)
       allocate (s%memory(nx, ny))
-      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), error)
+      call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), size(s%memory, kind=int64), error)
       call check_no_error(error, 'a preconditioner')
       n = nx*ny
       allocate (b(n, n), e(n, n), unit(n), r(n), z(n))
@@ -379,7 +471,7 @@ contains
       call s%active%list_wide_runs(s%preconditioner%search, far=.false.)
       call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
       call s%preconditioner%extend(s%coarse, s%active, steps, form)
-      do jb = 1, s%coarse%ny
+      do jb = s%coarse%strips(1), s%coarse%strips(2)
          do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1
             do i = 1, s%grid%nx
                out(i, j) = s%preconditioner%image(i, j) + s%preconditioner%blocks%pending(s%coarse%block_x(i), jb)

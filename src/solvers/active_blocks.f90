@@ -8,9 +8,11 @@
 !> in use if an active block is at most as far away as the rim is wide. With half of this rim the solver needs up
 !> to a third more iterations. Up to about 1024 x 1024 cells a wider rim does not reduce them. On larger grids the
 !> gaps between patches of contact are wider, and the far rim of a sixteenth of the longer side saves iterations.
+!> The wide blocks extend over the margin of a free grid (module `coarse_level`), too.
 module active_blocks
    use asperity_parallel, only : on_any_process
    use asperity_precision, only : dp, sp
+   use coarse_level, only : coarse_level_type
    use regular_grid, only : boundary_periodic, grid_type
    implicit none
    private
@@ -31,6 +33,9 @@ module active_blocks
       integer, private :: rim(2) = 0               !! along x and y
       integer, private :: far_rim(2) = 0           !! the same, on large grids
       integer, private :: strips(2) = 0            !! first and last wide row of this process
+      integer, private :: columns(2) = 0           !! first and last column, with the margin
+      integer, private :: all_rows(2) = 0          !! first and last row of this process, with the margin
+      integer, private :: before = 0               !! wide blocks of the margin before the first column of the map
       integer, allocatable, private :: first_y(:)  !! first row of each wide row, and the end
       integer, allocatable :: runs(:)              !! number of a row's active runs
       integer, allocatable :: first(:, :)          !! their first cells
@@ -52,51 +57,49 @@ module active_blocks
 contains
 
    !> Make the blocks of a grid. None of them is active yet.
-   subroutine new_active_blocks(self, grid, first_y, strips, rim, threads)
+   subroutine new_active_blocks(self, grid, coarse, rim, threads)
       type(active_blocks_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
-      integer, intent(in) :: first_y(:)            !! first row of each wide row, among those of this process
-      integer, intent(in) :: strips(2)             !! first and last wide row of this process
+      type(coarse_level_type), intent(in) :: coarse   !! whose rows of blocks are the wide rows
       logical, intent(in) :: rim                   !! there is a rim
       integer, intent(in) :: threads
-      integer :: blocks, wide_rows
+      integer :: blocks, wide_blocks
 
       self%nx = grid%nx
       self%rows = grid%rows()
       self%periodic = grid%boundary == boundary_periodic
-      self%strips = strips
-      self%first_y = first_y
+      self%strips = coarse%all_strips
+      self%columns = coarse%columns
+      self%all_rows = coarse%rows
+      self%first_y = coarse%first_y
       if (rim) self%rim = [rim_x, rim_y]
       if (rim) self%far_rim = max(self%rim, max(grid%nx, grid%ny)/(far_part*width*rim_x)*self%rim)
       self%threads = threads
       blocks = (self%nx + width - 1)/width
-      wide_rows = size(first_y) - 1
+      self%before = (coarse%margin(1) + width - 1)/width
+      wide_blocks = self%before + (coarse%columns(2) + width - 1)/width
       allocate (self%least(blocks, self%rows), self%loaded(blocks, self%rows))
-      allocate (self%live(blocks, self%rows), self%wide(blocks, wide_rows), source=.false.)
+      allocate (self%live(blocks, self%rows), self%wide(wide_blocks, coarse%ny), source=.false.)
       allocate (self%first(blocks, self%rows), self%last(blocks, self%rows), self%runs(self%rows))
-      allocate (self%wide_first(blocks, wide_rows), self%wide_last(blocks, wide_rows))
-      allocate (self%wide_runs(wide_rows), source=0)
+      allocate (self%wide_first(wide_blocks, coarse%ny), self%wide_last(wide_blocks, coarse%ny))
+      allocate (self%wide_runs(coarse%ny), source=0)
    end subroutine new_active_blocks
 
    !> Deactivate all blocks, and set the work fields to zero.
    subroutine clear(self, residual, direction, search)
       class(active_blocks_type), intent(inout) :: self
-      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1)
+      real(sp), intent(inout) :: residual(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
-      real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
+      real(sp), intent(inout) :: search(self%columns(1) - 1:, self%all_rows(1) - 1:)
       integer :: j
 
       !$omp parallel do default(none) shared(self, residual, direction, search) private(j) &
       !$omp num_threads(self%threads)
-      do j = 1, self%rows
+      do j = self%all_rows(1) - 1, self%all_rows(2) + 1
          residual(:, j) = 0.0_sp
-         direction(:, j) = 0.0_sp
          search(:, j) = 0.0_sp
+         if (j >= 1 .and. j <= self%rows) direction(:, j) = 0.0_sp
       end do
-      residual(:, 0) = 0.0_sp
-      residual(:, self%rows + 1) = 0.0_sp
-      search(:, 0) = 0.0_sp
-      search(:, self%rows + 1) = 0.0_sp
       self%live = .false.
       self%wide = .false.
    end subroutine clear
@@ -162,7 +165,7 @@ contains
    subroutine list_runs(self, level, residual, direction)
       class(active_blocks_type), intent(inout) :: self
       real(dp), intent(in) :: level                !! m
-      real(sp), intent(inout) :: residual(0:, 0:)  !! (0:nx+1, 0:rows+1)
+      real(sp), intent(inout) :: residual(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
       integer :: b, j, first, last, n
       logical :: now, before
@@ -196,7 +199,7 @@ contains
    !> List the runs of wide blocks. Set the search direction to zero in those that are no longer in use.
    subroutine list_wide_runs(self, search, far)
       class(active_blocks_type), intent(inout) :: self
-      real(sp), intent(inout) :: search(0:, 0:)    !! (0:nx+1, 0:rows+1)
+      real(sp), intent(inout) :: search(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
       logical, intent(in) :: far                   !! with the far rim
       logical, allocatable :: used(:, :)
       integer :: b, j, k, first, last, n
@@ -209,8 +212,8 @@ contains
          n = 0
          before = .false.
          do b = 1, size(used, 1)
-            first = (b - 1)*width + 1
-            last = min(b*width, self%nx)
+            first = max((b - self%before - 1)*width + 1, self%columns(1))
+            last = min((b - self%before)*width, self%columns(2))
             if (used(b, j)) then
                if (.not. before) then
                   n = n + 1
@@ -243,8 +246,10 @@ contains
       do j = 1, size(used, 2)
          used(:, j) = .false.
          if (j < self%strips(1) .or. j > self%strips(2)) cycle
-         do k = self%first_y(j), self%first_y(j + 1) - 1
-            used(:, j) = used(:, j) .or. self%live(:, k)
+         do k = max(self%first_y(j), 1), min(self%first_y(j + 1) - 1, self%rows)
+            associate (over_map => used(self%before + 1:self%before + size(self%live, 1), j))
+               over_map = over_map .or. self%live(:, k)
+            end associate
          end do
       end do
       ! The rim of a block may reach rows of other processes.

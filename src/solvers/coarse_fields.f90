@@ -4,7 +4,7 @@
 !> cell on its edge the part that lies in it. Processes share the rows of both grids, each grid by its own rule.
 module coarse_fields
    use asperity_precision, only : dp, int64
-   use regular_grid, only : grid_type, new_grid
+   use regular_grid, only : boundary_periodic, grid_type, new_grid
    use row_halo, only : fetch_rows
    use transform_lengths, only : good_length
    implicit none
@@ -183,7 +183,10 @@ contains
    !> Interpolate a pressure of the coarse grid between the centres of its cells by cubic polynomials: linear ones
    !> would lose much of the shortest waves, which span four coarse cells if the waves of the road span sixteen of the
    !> grid. The pressure is positive on exactly those coarse cells that touch: interpolated pressure would widen the
-   !> contact by half a coarse cell. Collective.
+   !> contact by half a coarse cell.
+   !>
+   !> Where a contact reaches the edge of a free map, its pressure is like that under the edge of a punch, and grows as
+   !> d^(-1/2) with the distance d from the edge. Its ratio to this is interpolated there, and goes on beyond the edge. Collective.
    subroutine refine_pressure(coarse, fine, values, threads, pressure)
       type(grid_type), intent(in) :: coarse, fine
       real(dp), intent(in) :: values(:, :)         !! [coarse%nx, coarse%rows()], Pa
@@ -214,24 +217,27 @@ contains
       real(dp), allocatable :: rows(:, :), between(:)
       type(place_type), allocatable :: along_x(:)
       type(place_type) :: place
+      logical :: has_edges
       integer :: range(2), i, j
 
+      has_edges = is_pressure .and. coarse%boundary /= boundary_periodic
       range = [1, 0]
       if (fine%rows() > 0) range = [below_centre(fine%ny, coarse%ny, fine%first_row) - 1, &
          below_centre(fine%ny, coarse%ny, fine%last_row) + 2]
+      if (has_edges) range = [max(range(1), 1), min(range(2), coarse%ny)]
       allocate (rows(coarse%nx, range(1):range(2)))
       call fetch_rows(coarse, values, range, rows)
-      along_x = [(place_of_cell(coarse%nx, fine%nx, i, is_pressure), i=1, fine%nx)]
+      along_x = [(place_of_cell(coarse%nx, fine%nx, i, is_pressure, has_edges), i=1, fine%nx)]
       do i = 1, fine%nx
          along_x(i)%beside = coarse%column_at(along_x(i)%beside)
       end do
 
-      !$omp parallel default(none) shared(coarse, fine, rows, is_pressure, field, along_x) &
+      !$omp parallel default(none) shared(coarse, fine, rows, is_pressure, has_edges, field, along_x) &
       !$omp private(i, j, place, between) num_threads(threads)
       allocate (between(0:coarse%nx), source=0.0_dp)
       !$omp do
       do j = 1, fine%rows()
-         place = place_of_cell(coarse%ny, fine%ny, fine%first_row - 1 + j, is_pressure)
+         place = place_of_cell(coarse%ny, fine%ny, fine%first_row - 1 + j, is_pressure, has_edges)
          do i = 1, coarse%nx
             between(i) = interpolate(place, is_pressure, rows(i, place%beside(1)), rows(i, place%beside(2)), &
                rows(i, place%beside(3)), rows(i, place%beside(4)))
@@ -247,9 +253,10 @@ contains
    end subroutine refine
 
    !> The place of the centre of cell k of n between those of the coarse cells along a side.
-   pure function place_of_cell(coarse, n, k, is_pressure) result(place)
+   pure function place_of_cell(coarse, n, k, is_pressure, has_edges) result(place)
       integer, intent(in) :: coarse, n, k
       logical, intent(in) :: is_pressure
+      logical, intent(in) :: has_edges             !! its pressure is like that of a punch there
       type(place_type) :: place
       real(dp) :: t, curved
       integer :: i
@@ -262,7 +269,27 @@ contains
       curved = t*(1.0_dp - t)/6.0_dp
       place%weights = place%weights - curved*((2.0_dp - t)*[1.0_dp, -2.0_dp, 1.0_dp, 0.0_dp] &
          + (1.0_dp + t)*[0.0_dp, 1.0_dp, -2.0_dp, 1.0_dp])
+      if (.not. has_edges) return
+      place%beside = min(max(place%beside, 1), coarse)
+      place%weights = place%weights*edge_pressure(n, k)/edge_pressure(coarse, place%beside)
    end function place_of_cell
+
+   !> Mean pressure of cell k of n under a punch between edges at both ends, but for a factor: that of d^(-1/2) for one edge
+   !> times that for the other.
+   elemental real(dp) function edge_pressure(n, k)
+      integer, intent(in) :: n, k
+
+      edge_pressure = n*root_step(k)*root_step(n + 1 - k)
+
+   contains
+
+      pure real(dp) function root_step(distance)
+         integer, intent(in) :: distance           !! of the cell from the edge, from 1
+
+         root_step = sqrt(real(distance, dp)) - sqrt(real(distance - 1, dp))
+      end function root_step
+
+   end function edge_pressure
 
    !> Interpolate between four equidistant values. A pressure is 0 where the nearest one is 0, and positive elsewhere.
    pure function interpolate(place, is_pressure, before, below, above, beyond) result(value)

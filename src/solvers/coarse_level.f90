@@ -10,6 +10,10 @@
 !> of a divided level. Sums over the blocks are added in the order of the rows of blocks, so that both ways
 !> have the same results.
 !>
+!> On a free grid there are blocks beyond the edges of the map, too (`margin`): the solid goes on there, and the
+!> preconditioner extends the residual to it. Cells are counted from the map, so that those beyond it have the numbers
+!> up to 0, and those from nx + 1 on. Blocks are counted from the outermost one.
+!>
 !> Restriction (block sums over the mean block size) and prolongation (piecewise constant) are adjoint
 !> up to a factor, so that the preconditioner stays symmetric for any numbers of cells.
 module coarse_level
@@ -19,7 +23,7 @@ module coarse_level
    use field_sums, only : added, row_totals
    use kernels, only : kernel_type
    use asperity_precision, only : dp, pi, sp
-   use regular_grid, only : block_cells, grid_type, new_grid
+   use regular_grid, only : block_cells, boundary_periodic, grid_type, new_grid
    use row_sharing, only : new_row_sharing, owners_on_grid, row_sharing_type
    implicit none
    private
@@ -27,17 +31,24 @@ module coarse_level
    public :: coarse_level_type, edge_rows, inner_rows, new_coarse_level
 
    integer, parameter :: usual = int(block_cells)    !! cells of most blocks along a side
+   integer, parameter :: blocks_per_margin = 8       !! blocks of a free grid along its longer side for one beyond its edges ...
+   integer, parameter :: most_beyond = 4             !! ... of which there are no more than these
    real(dp), parameter :: many_blocks = 16384.0_dp   !! least number of blocks for which the level is divided
 
    !> The coarse level of a grid. A variable of this type must not be copied.
    type :: coarse_level_type
+      type(grid_type) :: outer                     !! the grid with its margin, whole on every process
+      integer :: margin(2) = 0                     !! cells beyond each edge, along x and y
+      integer :: columns(2) = 0                    !! first and last column with the margin
+      integer :: rows(2) = 0                       !! first and last row of this process with the margin
       integer :: nx = 0, ny = 0                    !! blocks
       real(dp) :: cells = 1.0_dp                   !! cells of a block, on average
       real(dp) :: h = 0.0_dp                       !! side of a square cell of the same area, m
       type(kernel_type) :: kernel                  !! normal response of the solid
-      integer, allocatable :: block_x(:)           !! block of a cell along x, [nx of the grid]
-      integer, allocatable :: last_x(:)            !! last cell of a block along x, [nx]
-      integer :: strips(2) = 0                     !! first and last row of blocks of this process ...
+      integer, allocatable :: block_x(:)           !! block of a cell along x, (columns(1):columns(2))
+      integer, allocatable :: sizes_x(:)           !! cells of a block along x, [nx]
+      integer :: strips(2) = 0                     !! first and last row of blocks of the map on this process ...
+      integer :: all_strips(2) = 0                 !! ... the same with the margin ...
       integer :: held(2) = 0                       !! ... and of those whose numbers it has: its own or all
       type(row_sharing_type) :: sharing            !! of the rows of blocks where the level is divided
       integer, allocatable :: first_y(:)           !! first row of a block among those of this process, [ny + 1]
@@ -58,65 +69,127 @@ module coarse_level
 contains
 
    !> Make the coarse level of a grid. Collective where processes share the rows.
-   subroutine new_coarse_level(self, grid, kernel, error)
+   subroutine new_coarse_level(self, grid, kernel, error, beyond)
       type(coarse_level_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(kernel_type), intent(in) :: kernel      !! normal response of the solid
       type(error_type), allocatable, intent(out) :: error
+      integer, intent(in), optional :: beyond      !! blocks beyond each edge; default: see `blocks_beyond`
       type(grid_type) :: blocks
-      real(dp) :: h
-      integer, allocatable :: owner(:)
-      logical :: divided
-      integer :: counts(2), i, j
+      integer :: counts(2), more(2)
 
-      h = grid%cell_side()
       counts = grid%blocks()
-      self%nx = counts(1)
-      self%ny = counts(2)
-      self%cells = grid%cells()/(real(self%nx, dp)*self%ny)
-      self%h = h
+      more = blocks_beyond(grid)
+      if (present(beyond)) more = beyond
+      self%margin = more*nint(real([grid%nx, grid%ny], dp)/counts)
+      self%outer = new_grid(grid%nx + 2*self%margin(1), grid%ny + 2*self%margin(2), &
+         grid%lx + 2*self%margin(1)*grid%dx, grid%ly + 2*self%margin(2)*grid%dy, grid%boundary)
+      self%nx = counts(1) + 2*more(1)
+      self%ny = counts(2) + 2*more(2)
+      self%cells = self%outer%cells()/(real(self%nx, dp)*self%ny)
+      self%h = grid%cell_side()
       self%kernel = kernel
-      self%fine_symbol = kernel%compliance(2.0_dp*pi/(block_cells*h))
+      self%fine_symbol = kernel%compliance(2.0_dp*pi/(block_cells*self%h))
       ! A block of very oblong cells is much longer than the waves that its mean does not contain.
       if (grid%very_oblong()) self%fine_symbol = kernel%compliance(2.0_dp*pi/(block_cells*min(grid%dx, grid%dy)))
 
-      allocate (self%block_x(grid%nx), self%last_x(self%nx), self%first_y(self%ny + 1))
-      do i = 1, grid%nx
-         self%block_x(i) = int(int(i - 1, kind=8)*self%nx/grid%nx) + 1
-         self%last_x(self%block_x(i)) = i
-      end do
-      do j = 1, self%ny + 1
-         self%first_y(j) = grid%strip_start(j) - grid%first_row + 1
-      end do
-      ! Blocks whose first row is among the rows of this process.
-      self%strips = [count(self%first_y(:self%ny) < 1) + 1, count(self%first_y(:self%ny) <= grid%rows())]
-      divided = grid%shared .and. real(self%nx, dp)*self%ny >= many_blocks
-      self%copied = grid%shared .and. .not. divided
-      self%held = merge(self%strips, [1, self%ny], divided)
-      allocate (self%mean(self%nx, self%held(1):self%held(2)))
-
-      owner = owners_on_grid(grid)
-      owner = owner([(grid%strip_start(j), j=1, self%ny)])
-      call new_row_sharing(self%sharing, owner, divided)
-      blocks = new_grid(self%nx, self%ny, grid%lx, grid%ly, grid%boundary)
+      call divide_columns(self, grid, counts(1), more(1))
+      call divide_rows(self, grid, counts(2), more(2))
+      allocate (self%mean(self%nx, self%held(1):self%held(2)), source=0.0_dp)
+      blocks = new_grid(self%nx, self%ny, self%outer%lx, self%outer%ly, grid%boundary)
       call new_convolution(self%normal, blocks, kernel, error, sharing=self%sharing)
    end subroutine new_coarse_level
+
+   !> Blocks beyond each edge of a grid, along x and y.
+   pure function blocks_beyond(grid) result(more)
+      type(grid_type), intent(in) :: grid
+      integer :: more(2)
+
+      more = 0
+      if (grid%boundary == boundary_periodic .or. grid%very_oblong()) return
+      more = min(max(nint(maxval(grid%blocks())/real(blocks_per_margin, dp)), 1), most_beyond)
+      where ([grid%nx, grid%ny] == 1) more = 0
+   end function blocks_beyond
+
+   !> Divide the columns into blocks.
+   pure subroutine divide_columns(self, grid, blocks, beyond)
+      type(coarse_level_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: blocks                !! of the map
+      integer, intent(in) :: beyond                !! blocks beyond each edge
+      integer :: i
+
+      self%columns = [1 - self%margin(1), grid%nx + self%margin(1)]
+      allocate (self%block_x(self%columns(1):self%columns(2)))
+      do i = self%columns(1), self%columns(2)
+         if (i < 1) then
+            self%block_x(i) = (i - self%columns(1))*beyond/self%margin(1) + 1
+         else if (i > grid%nx) then
+            self%block_x(i) = beyond + blocks + (i - grid%nx - 1)*beyond/self%margin(1) + 1
+         else
+            self%block_x(i) = beyond + int(int(i - 1, kind=8)*blocks/grid%nx) + 1
+         end if
+      end do
+      allocate (self%sizes_x(self%nx), source=0)
+      do i = self%columns(1), self%columns(2)
+         self%sizes_x(self%block_x(i)) = self%sizes_x(self%block_x(i)) + 1
+      end do
+   end subroutine divide_columns
+
+   !> Divide the rows into blocks, and the rows of blocks among the processes. The margin belongs to the processes that hold
+   !> the rows at the edges.
+   subroutine divide_rows(self, grid, blocks, beyond)
+      type(coarse_level_type), intent(inout) :: self
+      type(grid_type), intent(in) :: grid
+      integer, intent(in) :: blocks                !! rows of blocks of the map
+      integer, intent(in) :: beyond                !! rows of blocks beyond each edge
+      integer :: owner(grid%ny), starts(blocks + 1)
+      logical :: divided
+      integer :: height, j
+
+      height = 0
+      if (beyond > 0) height = self%margin(2)/beyond
+      owner = owners_on_grid(grid)
+      starts = [(grid%strip_start(j), j=1, blocks + 1)]
+      ! Rows of blocks of the map whose first row is among the rows of this process.
+      self%strips = beyond + [count(starts(:blocks) < grid%first_row) + 1, count(starts(:blocks) <= grid%last_row)]
+      self%all_strips = self%strips
+      self%rows = [1, grid%rows()]
+      if (grid%rows() > 0 .and. grid%first_row == 1) then
+         self%all_strips(1) = 1
+         self%rows(1) = 1 - self%margin(2)
+      end if
+      if (grid%rows() > 0 .and. grid%last_row == grid%ny) then
+         self%all_strips(2) = self%ny
+         self%rows(2) = grid%rows() + self%margin(2)
+      end if
+      self%first_y = [[(1 - (beyond + 1 - j)*height, j=1, beyond)], starts, [(grid%ny + 1 + j*height, j=1, beyond)]] &
+         - grid%first_row + 1
+
+      divided = grid%shared .and. real(self%nx, dp)*self%ny >= many_blocks
+      self%copied = grid%shared .and. .not. divided
+      self%held = merge(self%all_strips, [1, self%ny], divided)
+      call new_row_sharing(self%sharing, [spread(owner(1), 1, beyond), owner(starts(:blocks)), &
+         spread(owner(grid%ny), 1, beyond)], divided)
+   end subroutine divide_rows
 
    !> Form the sums over the blocks along x of values in single precision.
    pure subroutine sum_blocks_single(self, column, blocks)
       class(coarse_level_type), intent(in) :: self
-      real(sp), intent(in) :: column(:)        !! sums over the rows of a row of blocks, [nx of the grid]
+      real(sp), intent(in) :: column(:)        !! sums over the rows of a row of blocks, [columns]
       real(dp), intent(out) :: blocks(:)       !! [nx]
       integer :: b, first
 
       first = 1
       do b = 1, self%nx
-         if (self%last_x(b) - first + 1 == usual) then
-            blocks(b) = sum_of_block(column(first:self%last_x(b)))
-         else
-            blocks(b) = sum(real(column(first:self%last_x(b)), dp))
-         end if
-         first = self%last_x(b) + 1
+         associate (n => self%sizes_x(b))
+            if (n == usual) then
+               blocks(b) = sum_of_block(column(first:first + n - 1))
+            else
+               blocks(b) = sum(real(column(first:first + n - 1), dp))
+            end if
+            first = first + n
+         end associate
       end do
    end subroutine sum_blocks_single
 
@@ -142,8 +215,8 @@ contains
 
       first = 1
       do b = 1, self%nx
-         blocks(b) = sum(column(first:self%last_x(b)))
-         first = self%last_x(b) + 1
+         blocks(b) = sum(column(first:first + self%sizes_x(b) - 1))
+         first = first + self%sizes_x(b)
       end do
    end subroutine sum_blocks_double
 
@@ -153,7 +226,7 @@ contains
       class(coarse_level_type), intent(in) :: self
       real(dp), intent(inout) :: values(:, :)          !! [nx, held rows]
 
-      if (self%copied) values(:, :) = gather_rows(values(:, self%strips(1):self%strips(2)))
+      if (self%copied) values(:, :) = gather_rows(values(:, self%all_strips(1):self%all_strips(2)))
    end subroutine share_blocks
 
    !> Totals over the rows of blocks, added in their order. Collective.

@@ -59,7 +59,7 @@ module normal_cg
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
    use projection, only : project_simplex
-   use regular_grid, only : grid_type, large_grid
+   use regular_grid, only : boundary_periodic, grid_type, large_grid
    use solver_result, only : solver_result_type
    use stop_watch, only : stop_is_due
    implicit none
@@ -347,7 +347,8 @@ contains
       call solver%solve(problem, road, pressure, gap, level, outcome, memory)
       call solver%destroy()
       effort = effort + outcome%ffts*coarse%cells()/self%grid%cells()
-      useful = outcome%converged .and. field_count(pressure > 0.0_dp) < nearly_full*coarse%cells()
+      useful = outcome%converged
+      if (coarse%boundary == boundary_periodic) useful = useful .and. field_count(pressure > 0.0_dp) < nearly_full*coarse%cells()
    end subroutine solve_roughly
 
    !> Transforms done so far. Those of the coarse level count by their number of cells.

@@ -10,11 +10,10 @@
 !> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
-!> There are directions of another kind: plain ones, those of very oblong cells, those on a free strip of few cells
-!> across, whose compliance is not that of a half-space, and all later ones of a solve in which several trials with
-!> released cells in a row did not lower the energy: the model then misleads, as on long grids of oblong cells. No cells
-!> are released for them, and alpha comes from a prediction of d.A d on the block means, which the ratio kappa of the last
-!> true product to its prediction corrects.
+!> There are directions of another kind: plain ones, those of very oblong cells, and all later ones of a solve in which
+!> several trials with released cells in a row did not lower the energy: the model then misleads, as on long grids of oblong
+!> cells. No cells are released for them, and alpha comes from a prediction of d.A d on the block means, which the ratio
+!> kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
@@ -69,7 +68,7 @@ module normal_iteration
    real(dp), parameter :: light = 0.1_dp, dense = 0.5_dp   !! contact fractions between which the number of steps changes
    real(dp), parameter, public :: sparse = 0.03_dp   !! largest contact fraction of a sparse contact
    integer, parameter :: largest_class = 2        !! of a sparse contact
-   integer, parameter :: least_across = 8         !! cells across a free strip for which the model fits
+   integer, parameter :: least_across = 1         !! cells across a free strip for which the model fits
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
@@ -137,7 +136,7 @@ contains
       call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
       work%preconditioner%fixed_load = fixed_load
-      now%releases = now%may_release .and. model_fits(work)
+      now%releases = now%may_release .and. .not. work%preconditioner%by_waves
       now%class = size_class(work%grid, measure%contact)
       steps = merge(steps_before(now%class), steps_alone(now%class), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
@@ -215,15 +214,6 @@ contains
          call shorten(now)
       end if
    end subroutine choose_step
-
-   !> Do the eigenvalues of M A lie within a factor of two?
-   pure logical function model_fits(work)
-      type(normal_work_type), intent(in) :: work
-
-      model_fits = .not. work%preconditioner%by_waves
-      if (work%grid%boundary /= boundary_periodic) &
-         model_fits = model_fits .and. min(work%grid%nx, work%grid%ny) >= least_across
-   end function model_fits
 
    !> Does this iteration release cells? Not if its direction is a plain one.
    pure logical function is_releasing(now)

@@ -56,10 +56,10 @@ contains
       allocate (self%state(self%grid%rows()))
       call new_coarse_level(self%coarse, self%grid, operator%kernel, error)
       if (.not. allocated(error)) call new_schur_preconditioner(self%preconditioner, self%grid, self%coarse, &
-         self%threads, operator%spectrum_memory(), error)
+         self%threads, operator%spectrum_memory(), operator%spectrum_length(), error)
       allocate (self%direction(self%grid%nx, self%grid%rows(), merge(lowered, as_formed, self%preconditioner%by_waves)))
-      if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse%first_y, &
-         self%coarse%strips, .not. self%preconditioner%by_waves, self%threads)
+      if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse, &
+         .not. self%preconditioner%by_waves, self%threads)
    end subroutine new_normal_work
 
    !> Find out which blocks have pressure, the least gap of each block, and the sums of the state.
@@ -94,7 +94,7 @@ contains
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          correction(:) = self%preconditioner%correction(self%coarse, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            response => self%preconditioner%response_row(j)
+            response(self%coarse%columns(1):) => self%preconditioner%response_row(j)
             do k = 1, self%active%runs(j)
                associate (a => self%active%first(k, j), b => self%active%last(k, j))
                   rows(j) = rows(j) + overlap_cells(b - a + 1, self%preconditioner%length, &
@@ -151,7 +151,7 @@ contains
 
       allocate (squares(self%grid%rows()), source=0.0_dp)
       !$omp parallel default(none) shared(self, squares) private(j, k, jb, column) num_threads(self%threads)
-      allocate (column(self%grid%nx))
+      allocate (column(self%coarse%columns(1):self%coarse%columns(2)))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          column(:) = 0.0_dp
@@ -228,11 +228,11 @@ contains
       integer :: k
 
       ! z = image + length response + correction.
-      image => self%preconditioner%image(:, j)
+      image => self%preconditioner%image(1:self%grid%nx, j)
       if (.not. preconditioned) image => self%preconditioner%residual(1:self%grid%nx, j)
       length = merge(self%preconditioner%length, 0.0_sp, preconditioned)
       response => image
-      if (preconditioned) response => self%preconditioner%response_row(j)
+      if (preconditioned) response(self%coarse%columns(1):) => self%preconditioner%response_row(j)
       do k = 1, self%active%runs(j)
          associate (a => self%active%first(k, j), b => self%active%last(k, j))
             call direction_cells(b - a + 1, length, image(a:b), response(a:b), correction(a:b), &

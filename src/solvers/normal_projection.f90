@@ -80,7 +80,7 @@ contains
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          correction(:) = self%preconditioner%correction(self%coarse, jb)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
-            response => self%preconditioner%response_row(j)
+            response(self%coarse%columns(1):) => self%preconditioner%response_row(j)
             rows(j) = trial_sums_type()
             do k = 1, self%active%runs(j)
                associate (a => self%active%first(k, j), b => self%active%last(k, j))
@@ -232,7 +232,7 @@ contains
       allocate (rows(self%grid%rows()))
       !$omp parallel default(none) shared(self, operator, level, pressure, gap, rows) private(j, k, jb, column, step) &
       !$omp num_threads(self%threads)
-      allocate (column(self%grid%nx), step(self%grid%nx))
+      allocate (column(self%coarse%columns(1):self%coarse%columns(2)), step(self%grid%nx))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          column(:) = 0.0_dp

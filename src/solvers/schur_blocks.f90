@@ -13,7 +13,6 @@ module schur_blocks
    use asperity_precision, only : dp
    use asperity_threads, only : least_parallel_cells
    use coarse_level, only : coarse_level_type
-   use regular_grid, only : grid_type
    use schur_coarse, only : new_schur_coarse, om, schur_coarse_type
    implicit none
    private
@@ -48,23 +47,22 @@ module schur_blocks
 
 contains
 
-   !> Make the numbers for the coarse level of a grid. Collective if processes share the rows.
-   subroutine new_schur_blocks(self, grid, coarse, threads, error)
+   !> Make the numbers for a coarse level. Collective if processes share the rows.
+   subroutine new_schur_blocks(self, coarse, threads, error)
       type(schur_blocks_type), intent(out) :: self
-      type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
 
       self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < least_parallel_cells)
-      self%cells = grid%cells()
+      self%cells = coarse%outer%cells()
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
          allocate (self%pending(nx, first:last), self%correction(nx, first:last), source=0.0_dp)
          allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
          allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
          allocate (self%search_off(nx, first:last), self%coarse_image(nx, first:last), source=0.0_dp)
       end associate
-      call new_schur_coarse(self%model, grid, coarse%h, coarse%nx, coarse%sharing, threads, error)
+      call new_schur_coarse(self%model, coarse%outer, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
 
    !> Make the mean of v over the grid stiff; 0 leaves the model as it is. In the units of the model.

@@ -72,7 +72,7 @@ contains
    !> Make the coarse part for a grid of blocks. Collective where processes share the rows.
    subroutine new_schur_coarse(self, grid, h, blocks_x, sharing, threads, error)
       type(schur_coarse_type), intent(out) :: self
-      type(grid_type), intent(in) :: grid
+      type(grid_type), intent(in) :: grid              !! with its margin
       real(dp), intent(in) :: h                        !! side of a square cell of the same area, m
       integer, intent(in) :: blocks_x                  !! blocks along x
       type(row_sharing_type), intent(in) :: sharing    !! of the rows of blocks

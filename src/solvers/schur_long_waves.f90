@@ -1,20 +1,21 @@
-!> Keeps the load of the long waves of a step on a long grid.
+!> Keeps the load of the long waves of a step, on a long grid and on a free one.
 !>
 !> A step consists of the image b = B v on the contact (module `schur_preconditioner`). In the cells outside it b should be
 !> zero. After a few conjugate gradients it is nearly zero there, and what is left of it is not part of the step. The load of
 !> the step along a wave is then wrong by that of this rest. The energy of such an error is proportional to the wavelength.
-!> For the longest wave of all, the uniform pressure, the projection on the given load corrects it. On a grid that is as
-!> long as wide hardly any other wave is long enough to matter. But on a long grid the waves along it are, and without a
-!> correction many steps of rough contacts raised the energy, so that they took up to ten times as many iterations.
-!> (`python tools/campaign_contact.py long` prints the iterations.)
+!> For the longest wave of all, the uniform pressure, the projection on the given load corrects it. On a periodic grid that
+!> is as long as wide hardly any other wave is long enough to matter. But on a long grid the waves along it are, and without
+!> a correction many steps of rough contacts raised the energy, so that they took up to ten times as many iterations.
+!> (`python tools/campaign_contact.py long` prints the iterations.) The solid below a free grid has longer waves than the
+!> grid. There the correction saves a few iterations of large contacts.
 !>
 !> The rest is therefore given to the contact nearby, as a number per block: the load that is missing in each block is
 !> divided by the smoothed number of cells in contact, and smoothed in its turn. The smoothing keeps the sum over the grid,
 !> so that all of the rest arrives in the contact. It spreads over the shorter side of the grid, with a tail that
 !> falls like the displacement beside a load and reaches the contact wherever it is.
 !>
-!> This holds for a given load on a periodic grid only. At a given approach, and on a free grid, what is left outside the
-!> contact changes the load itself, and giving it to the contact made many contacts slower.
+!> This holds for a given load only. At a given approach, what is left outside the contact changes the load itself, and
+!> giving it to the contact made many contacts slower.
 module schur_long_waves
    use active_blocks, only : active_blocks_type
    use asperity_errors, only : error_type
@@ -34,7 +35,7 @@ module schur_long_waves
 
    !> The correction. A variable of this type must not be copied.
    type :: long_waves_type
-      logical :: matter = .false.                      !! the grid is long and periodic
+      logical :: matter = .false.                      !! the grid is long, or free
       integer, private :: threads = 1
       real(dp), private :: block_size = 1.0_dp         !! cells of a block, on average
       real(dp), allocatable, private :: cells(:, :)    !! cells of each block, (nx, held rows of blocks)
@@ -59,15 +60,15 @@ contains
       integer :: width(coarse%nx), j
 
       if (allocated(error)) return
-      self%matter = grid%boundary == boundary_periodic .and. min(grid%nx, grid%ny) > 1 .and. grid%is_long()
+      self%matter = min(grid%nx, grid%ny) > 1 .and. (grid%boundary /= boundary_periodic .or. grid%is_long())
       if (.not. self%matter) return
       self%block_size = coarse%cells
       self%threads = threads
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
-         allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last))
-         width = coarse%last_x - [0, coarse%last_x(:nx - 1)]
+         allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last), source=0._dp)
+         width = coarse%sizes_x
          do j = first, last
-            self%cells(:, j) = real(width*(grid%strip_start(j + 1) - grid%strip_start(j)), dp)
+            self%cells(:, j) = real(width*(coarse%first_y(j + 1) - coarse%first_y(j)), dp)
          end do
       end associate
       call new_symbol_operator(self%smoother, shape_of_rows(coarse%nx, coarse%sharing, 1), error, single=.true.)
@@ -98,7 +99,7 @@ contains
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: offset                   !! number by which the step lowers the direction
-      real(sp), intent(in) :: residual(0:, 0:)         !! not 0 in contact
+      real(sp), intent(in) :: residual(coarse%columns(1)-1:, coarse%rows(1)-1:)         !! not 0 in contact
       real(sp), intent(in) :: direction(:, :)          !! before the change, not 0 where it acts
       type(schur_blocks_type), intent(inout) :: blocks
       real(dp), dimension(coarse%nx, coarse%held(1):coarse%held(2)) :: missing, nearby, smoothed
@@ -120,8 +121,8 @@ contains
       type(long_waves_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
-      real(sp), intent(in) :: residual(0:, 0:), direction(:, :)
-      real(sp) :: inside(size(direction, 1)), acting(size(direction, 1))
+      real(sp), intent(in) :: residual(coarse%columns(1)-1:, coarse%rows(1)-1:), direction(:, :)
+      real(sp) :: inside(coarse%columns(1):coarse%columns(2)), acting(coarse%columns(1):coarse%columns(2))
       integer :: j, jb, k
 
       !$omp parallel do default(none) shared(self, coarse, active, residual, direction) &

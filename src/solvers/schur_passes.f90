@@ -26,27 +26,25 @@ module schur_passes
 
    public :: add_blocks, residual_pass, schur_fields_type, search_pass, step_type
 
-   !> Value of v beside the edge of a free grid, over that at the edge. Beyond it the solid goes on without pressure, as in
-   !> N, and v falls with the distance; in the stencil alone by half per cell. With 0 or 1 instead, contacts that reach the
-   !> edge take more iterations.
-   real(sp), parameter :: beyond = 0.75_sp
-
    integer, parameter :: together = 16            !! rows of blocks of a portion, at most
    integer, parameter :: portions_of_thread = 8   !! at least, if there are enough rows of blocks
 
    !> The fields of the preconditioner and its stencil.
    type :: schur_fields_type
       type(grid_type) :: grid
+      integer :: columns(2) = 0                          !! first and last column with the margin
+      integer :: rows(2) = 0                             !! first and last row of this process with the margin
       type(row_halo_type) :: rim                         !! rows of other processes that the stencil reads
       integer :: threads = 1
       real(sp) :: weights(3) = 0.0_sp                    !! of the stencil: centre, along x, along y
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       type(image_sums_type) :: sums                      !! of the residual and its image
-      real(sp), allocatable :: residual(:, :)            !! (0:nx+1, 0:ny+1), v on S, 0 on N
-      real(sp), allocatable :: before(:, :)              !! [nx, ny], the residual of the iteration before
-      real(sp), allocatable :: search(:, :)              !! (0:nx+1, 0:ny+1), d, 0 on S
-      real(sp), pointer, contiguous :: image(:, :) => null()      !! [nx, ny], b
-      real(sp), pointer, contiguous :: response(:, :) => null()   !! [nx, ny], e of the last step
+      ! Over the columns and rows; the residual and the direction have one more on each side:
+      real(sp), allocatable :: residual(:, :)            !! v on S, 0 on N
+      real(sp), allocatable :: before(:, :)              !! the residual of the iteration before, [nx, ny]
+      real(sp), allocatable :: search(:, :)              !! d, 0 on S
+      real(sp), pointer, contiguous :: image(:, :) => null()      !! b
+      real(sp), pointer, contiguous :: response(:, :) => null()   !! e of the last step
       real(sp) :: length = 0.0_sp                        !! multiple of e that is still to be added to b
    contains
       procedure :: response_row
@@ -73,21 +71,24 @@ contains
       real(dp) :: totals(2)
       integer :: c, jb, strips(2)
 
-      allocate (rows(self%grid%rows()))
+      allocate (rows(self%rows(1):self%rows(2)))
       !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) private(c, jb, strips) &
       !$omp num_threads(self%threads)
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
          strips = portion(self, coarse, c)
          do jb = strips(1), strips(2)
-            call residual_rows(self, coarse, active, jb, scale, level, pressure, gap)
+            if (jb >= coarse%strips(1) .and. jb <= coarse%strips(2)) &
+               call residual_rows(self, coarse, active, jb, scale, level, pressure, gap)
+            self%blocks%image_off(:, jb) = 0.0_dp
+            self%blocks%cells_off(:, jb) = 0.0_dp
             call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
             if (jb - 1 > strips(1)) call image_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), rows)
          end do
       end do
       !$omp end do
       !$omp single
-      call close_field(self, self%residual)
+      call self%rim%close_rim(self%residual(:, 0:self%grid%rows() + 1))
       !$omp end single
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
@@ -115,7 +116,7 @@ contains
       real(sp), allocatable :: column(:)
       integer :: j, k
 
-      allocate (column(self%grid%nx), source=0.0_sp)
+      allocate (column(self%columns(1):self%columns(2)), source=0.0_sp)
       do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
          do k = 1, active%runs(j)
             associate (first => active%first(k, j))
@@ -127,8 +128,6 @@ contains
       end do
       call coarse%sum_blocks(column, coarse%mean(:, jb))
       coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
-      self%blocks%image_off(:, jb) = 0.0_dp
-      self%blocks%cells_off(:, jb) = 0.0_dp
    end subroutine residual_rows
 
    !> Compute the image of the residual by K in some rows of a block.
@@ -138,11 +137,11 @@ contains
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb                          !! row of blocks
       integer, intent(in) :: which(3)                    !! first and last row, and their distance
-      type(image_sums_type), intent(inout) :: rows(:)
+      type(image_sums_type), intent(inout) :: rows(self%rows(1):)
       real(sp), allocatable :: column(:), count(:)
       integer :: j, k
 
-      allocate (column(self%grid%nx), count(self%grid%nx), source=0.0_sp)
+      allocate (column(self%columns(1):self%columns(2)), count(self%columns(1):self%columns(2)), source=0.0_sp)
       do j = which(1), which(2), which(3)
          rows(j) = image_sums_type()
          do k = 1, active%wide_runs(jb)
@@ -168,7 +167,7 @@ contains
       real(dp) :: totals(3)
       integer :: c, jb, strips(2)
 
-      allocate (rows(self%grid%rows()))
+      allocate (rows(self%rows(1):self%rows(2)))
       !$omp parallel default(none) shared(self, coarse, active, step, rows) private(c, jb, strips) &
       !$omp num_threads(self%threads)
       !$omp do schedule(dynamic)
@@ -184,7 +183,7 @@ contains
       end do
       !$omp end do
       !$omp single
-      call close_field(self, self%search)
+      call self%rim%close_rim(self%search(:, 0:self%grid%rows() + 1))
       !$omp end single
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
@@ -210,7 +209,7 @@ contains
       integer :: j, k, n
 
       if (active%wide_runs(jb) == 0) return
-      allocate (added(self%grid%nx), corrected(self%grid%nx))
+      allocate (added(self%columns(1):self%columns(2)), corrected(self%columns(1):self%columns(2)))
       added(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
       corrected(:) = real(self%blocks%correction(coarse%block_x, jb), sp)
       do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
@@ -238,12 +237,12 @@ contains
       integer, intent(in) :: jb
       integer, intent(in) :: which(3)                    !! first and last row, and their distance
       logical, intent(in) :: last
-      type(response_sums_type), intent(inout) :: rows(:)
+      type(response_sums_type), intent(inout) :: rows(self%rows(1):)
       real(sp), allocatable :: column(:)
       integer :: j, k, n
 
       if (active%wide_runs(jb) == 0) return
-      allocate (column(self%grid%nx), source=0.0_sp)
+      allocate (column(self%columns(1):self%columns(2)), source=0.0_sp)
       do j = which(1), which(2), which(3)
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
@@ -268,7 +267,7 @@ contains
       class(schur_fields_type), intent(in) :: self
       type(coarse_level_type), intent(in) :: coarse
 
-      associate (strips => coarse%strips(2) - coarse%strips(1) + 1)
+      associate (strips => coarse%all_strips(2) - coarse%all_strips(1) + 1)
          portions = min(max((strips + together - 1)/together, portions_of_thread*self%threads), strips)
       end associate
    end function portions
@@ -281,9 +280,9 @@ contains
       integer :: strips(2)
       integer :: count, parts
 
-      count = coarse%strips(2) - coarse%strips(1) + 1
+      count = coarse%all_strips(2) - coarse%all_strips(1) + 1
       parts = portions(self, coarse)
-      strips = coarse%strips(1) + [(c - 1)*count/parts, c*count/parts - 1]
+      strips = coarse%all_strips(1) + [(c - 1)*count/parts, c*count/parts - 1]
    end function portion
 
    !> Add sums over the blocks along x.
@@ -308,31 +307,17 @@ contains
       if (self%length > 0.0_sp) row => self%response(:, j)
    end function response_row
 
-   !> Set the cells beside the ends of a row: those of the other end on a periodic grid, else a part of those at the edge.
+   !> Set the cells beside the ends of a row of a periodic grid: those of the other end. Beyond the margin of a free grid they
+   !> remain 0.
    pure subroutine close_row(self, row)
       class(schur_fields_type), intent(in) :: self
-      real(sp), intent(inout) :: row(0:)
+      real(sp), intent(inout) :: row(:)              !! all columns, with one more on each side
 
-      if (self%grid%boundary == boundary_periodic) then
-         row(0) = row(self%grid%nx)
-         row(self%grid%nx + 1) = row(1)
-      else
-         row(0) = beyond*row(1)
-         row(self%grid%nx + 1) = beyond*row(self%grid%nx)
-      end if
-   end subroutine close_row
-
-   !> The same for the rows before the first and behind the last one. Collective.
-   subroutine close_field(self, field)
-      class(schur_fields_type), intent(in) :: self
-      real(sp), intent(inout) :: field(0:, 0:)
-
-      call self%rim%close_rim(field)
-      associate (grid => self%grid, last => self%grid%rows())
-         if (grid%boundary == boundary_periodic .or. last == 0) return
-         if (grid%first_row == 1) field(:, 0) = beyond*field(:, 1)
-         if (grid%last_row == grid%ny) field(:, last + 1) = beyond*field(:, last)
+      if (self%grid%boundary /= boundary_periodic) return
+      associate (n => size(row))
+         row(1) = row(n - 1)
+         row(n) = row(2)
       end associate
-   end subroutine close_field
+   end subroutine close_row
 
 end module schur_passes

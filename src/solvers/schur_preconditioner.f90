@@ -29,14 +29,15 @@
 !> For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
-!> rim around the contact (the wide blocks of module `active_blocks`). Memory: five such fields, of which two lie in memory
-!> that the caller lends.
+!> rim around the contact (the wide blocks of module `active_blocks`). The rim goes on beyond the edges of a free map, where
+!> the solid does (the margin of module `coarse_level`); if v were 0 there, contacts that reach the edge would take up to
+!> three times as many iterations. Memory: five such fields, of which two lie in memory that the caller lends.
 module schur_preconditioner
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
    use active_blocks, only : active_blocks_type
    use coarse_level, only : coarse_level_type
    use asperity_errors, only : error_type
-   use asperity_precision, only : dp, pi, sp
+   use asperity_precision, only : dp, int64, pi, sp
    use normal_sweeps, only : trial_type
    use regular_grid, only : grid_type
    use row_halo, only : new_rim_halo
@@ -63,6 +64,7 @@ module schur_preconditioner
       real(dp) :: compliance = 0.0_dp                    !! typical eigenvalue of M A, m/Pa
       real(dp), private :: form = 0.0_dp                 !! r.M r
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
+      real(sp), pointer, contiguous, private :: own_memory(:, :, :) => null()   !! of the image and the response, if not lent
       type(wave_preconditioner_type) :: waves
       type(long_waves_type), private :: long_waves
    contains
@@ -76,19 +78,23 @@ module schur_preconditioner
 
 contains
 
-   !> Make the preconditioner of a grid. The image and the response lie in `memory` for a field of doubles, which others
-   !> may use from the last use of a direction until `set_residual`.
-   subroutine new_schur_preconditioner(self, grid, coarse, threads, memory, error)
+   !> Make the preconditioner of a grid. The image and the response lie in `memory`, if it is large enough. Others may use
+   !> it from the last use of a direction until `set_residual`.
+   subroutine new_schur_preconditioner(self, grid, coarse, threads, memory, length, error)
       type(schur_preconditioner_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
       type(c_ptr), intent(in) :: memory
+      integer(int64), intent(in) :: length               !! numbers in double precision that fit in it
       type(error_type), allocatable, intent(out) :: error
       real(sp), pointer, contiguous :: pair(:, :, :)
       real(dp) :: wx, wy
+      integer :: extents(2)
 
       self%grid = grid
+      self%columns = coarse%columns
+      self%rows = coarse%rows
       call new_rim_halo(self%rim, grid)
       self%threads = threads
       self%by_waves = grid%very_oblong()
@@ -97,13 +103,19 @@ contains
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([stencil_c0 + 2.0_dp*(wx + wy), wx, wy], sp)
       ! They take no memory before `clear` of module `active_blocks` sets them to zero, with the threads that use them.
-      allocate (self%residual(0:grid%nx + 1, 0:grid%rows() + 1))
+      allocate (self%residual(self%columns(1) - 1:self%columns(2) + 1, self%rows(1) - 1:self%rows(2) + 1))
       if (.not. self%by_waves) allocate (self%before(grid%nx, grid%rows()))
-      allocate (self%search(0:grid%nx + 1, 0:grid%rows() + 1))
-      call c_f_pointer(memory, pair, [grid%nx, grid%rows(), 2])
-      self%image => pair(:, :, 1)
-      self%response => pair(:, :, 2)
-      call new_schur_blocks(self%blocks, grid, coarse, threads, error)
+      allocate (self%search(self%columns(1) - 1:self%columns(2) + 1, self%rows(1) - 1:self%rows(2) + 1))
+      extents = [self%columns(2) - self%columns(1), self%rows(2) - self%rows(1)] + 1
+      if (product(int(extents, int64)) <= length) then
+         call c_f_pointer(memory, pair, [extents, 2])
+      else
+         allocate (self%own_memory(extents(1), extents(2), 2))
+         pair => self%own_memory
+      end if
+      self%image(self%columns(1):, self%rows(1):) => pair(:, :, 1)
+      self%response(self%columns(1):, self%rows(1):) => pair(:, :, 2)
+      call new_schur_blocks(self%blocks, coarse, threads, error)
       if (.not. self%by_waves) call new_long_waves(self%long_waves, grid, coarse, threads, error)
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
@@ -149,8 +161,8 @@ contains
    end subroutine extend
 
    !> Release the cells whose trial pressure is negative (module `schur_release`), and extend the residual to them by some
-   !> steps. Afterwards `image`, `response` and the coarse part hold the change of the direction. On a long grid it keeps
-   !> the load of the long waves (module `schur_long_waves`). Collective.
+   !> steps. Afterwards `image`, `response` and the coarse part hold the change of the direction. On a long or free grid it
+   !> keeps the load of the long waves (module `schur_long_waves`). Collective.
    subroutine release(self, coarse, active, steps, trial, pressure, direction)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -227,7 +239,7 @@ contains
       integer, intent(in) :: jb                          !! row of blocks
       real(sp) :: row(self%grid%nx)
 
-      row = real(self%blocks%pending(coarse%block_x, jb), sp)
+      row = real(self%blocks%pending(coarse%block_x(1:self%grid%nx), jb), sp)
    end function correction
 
    !> Transforms done so far, in units of a transform of the whole grid.
@@ -242,6 +254,7 @@ contains
    subroutine destroy(self)
       class(schur_preconditioner_type), intent(inout) :: self
 
+      if (associated(self%own_memory)) deallocate (self%own_memory)
       call self%blocks%model%destroy()
       call self%waves%destroy()
       call self%long_waves%destroy()

@@ -35,24 +35,33 @@ contains
       real(sp), allocatable :: column(:), count(:), correction(:)
       real(sp), pointer, contiguous :: response(:)
       real(dp), allocatable :: squares(:)
-      integer :: j, k, jb
+      integer :: j, k, jb, part, parts(2, 3)
 
-      allocate (squares(self%grid%rows()), source=0.0_dp)
+      allocate (squares(self%rows(1):self%rows(2)), source=0.0_dp)
       !$omp parallel default(none) shared(self, coarse, active, trial, pressure, direction, squares) &
-      !$omp private(j, k, jb, column, count, correction, response) num_threads(self%threads)
-      allocate (column(self%grid%nx), count(self%grid%nx), correction(self%grid%nx))
+      !$omp private(j, k, jb, part, parts, column, count, correction, response) num_threads(self%threads)
+      allocate (column(self%columns(1):self%columns(2)), count(self%columns(1):self%columns(2)))
+      allocate (correction(self%columns(1):self%columns(2)))
       !$omp do schedule(dynamic)
-      do jb = coarse%strips(1), coarse%strips(2)
+      do jb = coarse%all_strips(1), coarse%all_strips(2)
          correction(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
          column(:) = 0.0_sp
          count(:) = 0.0_sp
          do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
-            response => self%response_row(j)
+            response(self%columns(1):) => self%response_row(j)
             do k = 1, active%wide_runs(jb)
-               associate (a => active%wide_first(k, jb), b => active%wide_last(k, jb))
+               parts = parts_of_run(self, [active%wide_first(k, jb), active%wide_last(k, jb)], &
+                  jb >= coarse%strips(1) .and. jb <= coarse%strips(2))
+               associate (a => parts(1, 1), b => parts(2, 1))
                   call release_cells(b - a + 1, trial, self%length, response(a:b), correction(a:b), pressure(a:b, j), &
                      direction(a:b, j), self%residual(a:b, j), self%image(a:b, j), column(a:b), count(a:b), squares(j))
                end associate
+               do part = 2, 3
+                  associate (a => parts(1, part), b => parts(2, part))
+                     call image_of_open_cells(b - a + 1, self%length, response(a:b), correction(a:b), self%image(a:b, j), &
+                        column(a:b), count(a:b), squares(j))
+                  end associate
+               end do
             end do
          end do
          self%blocks%image_off(:, jb) = 0.0_dp
@@ -67,6 +76,36 @@ contains
       self%blocks%pending(:, :) = 0.0_dp
       self%length = 0.0_sp
    end subroutine release_pass
+
+   !> The parts of a run of cells in a row: its columns in the map, and those of the margin before and behind them. A part is
+   !> empty if its last column comes before its first one.
+   pure function parts_of_run(self, run, in_map) result(parts)
+      class(schur_fields_type), intent(in) :: self
+      integer, intent(in) :: run(2)                      !! first and last column
+      logical, intent(in) :: in_map                      !! the row belongs to the map, not to the margin
+      integer :: parts(2, 3)
+
+      associate (nx => self%grid%nx)
+         parts = reshape([max(run(1), 1), min(run(2), nx), run(1), min(run(2), 0), max(run(1), nx + 1), run(2)], [2, 3])
+      end associate
+      if (.not. in_map) parts = reshape([1, 0, run, 1, 0], [2, 3])
+   end function parts_of_run
+
+   !> Form the image of cells beyond the map, which are in N and stay there, with its sums.
+   pure subroutine image_of_open_cells(n, length, response, correction, image, column, count, squares)
+      integer, intent(in) :: n
+      real(sp), intent(in) :: length
+      real(sp), intent(in) :: response(n), correction(n)   !! M r = image + length response + correction
+      real(sp), intent(inout) :: image(n)
+      real(sp), intent(inout) :: column(n)          !! sums of the image over the rows of a block
+      real(sp), intent(inout) :: count(n)           !! numbers of cells likewise
+      real(dp), intent(inout) :: squares            !! sum of the squares of the image
+
+      image(:) = image + length*response + correction
+      column(:) = column + image
+      count(:) = count + 1.0_sp
+      squares = squares + sum(image**2)
+   end subroutine image_of_open_cells
 
    !> Release the cells of a part of a row, with the sums on N. One loop without branches, like those of module
    !> `schur_sweeps`.

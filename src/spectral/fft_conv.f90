@@ -69,6 +69,7 @@ module fft_conv
       procedure :: add_backward_row
       procedure :: set_unit
       procedure :: spectrum_memory
+      procedure :: spectrum_length
       procedure :: modes
       procedure :: set_symbol
       procedure :: destroy
@@ -209,6 +210,15 @@ contains
       memory = self%high%spectrum_memory
       if (self%single) memory = self%low%spectrum_memory
    end function spectrum_memory
+
+   !> Numbers in double precision for which that memory has space.
+   pure function spectrum_length(self) result(length)
+      class(convolution_type), intent(in) :: self
+      integer(int64) :: length
+
+      length = self%high%spectrum_length()
+      if (self%single) length = self%low%spectrum_length()/2
+   end function spectrum_length
 
    !> u = A p.
    subroutine apply(self, p, u, form)

@@ -18,7 +18,7 @@ module row_column_single
    use asperity_errors, only : error_input, error_memory, error_type, fail
    use column_parcels_single, only : block, column_parcels_type, new_column_parcels
    use omp_lib, only : omp_get_thread_num
-   use asperity_precision, only : dp, wp => sp
+   use asperity_precision, only : dp, int64, wp => sp
    use transform_shape, only : transform_shape_type
    use wisdom, only : from_measuring, from_memory, planning_flag, save_wisdom, share_wisdom
    implicit none
