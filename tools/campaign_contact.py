@@ -6,6 +6,7 @@ python tools/campaign_contact.py sizes              errors of rough contacts of 
 python tools/campaign_contact.py hertz              errors of single contacts of few cells
 python tools/campaign_contact.py oblong             iterations with cells longer than wide
 python tools/campaign_contact.py long               iterations on grids longer than wide
+python tools/campaign_contact.py edge               iterations of contacts at the edge of free maps
 python tools/campaign_contact.py pull               errors of the pull-off force of spheres
 """
 
@@ -252,12 +253,24 @@ def long():
         print(f"{nx} x {ny} cells: iterations {', '.join(counts)}")
 
 
+def edge():
+    """Print iterations and transforms of rough contacts that reach the edge of a free map."""
+    for n, boundary in itertools.product((128, 256, 512, 1024), ("free", "periodic")):
+        height = asperity.surface.self_affine(n, n, lx=1.0, ly=1.0, hurst=0.8, wavelength_long=0.5,
+                                              wavelength_short=8 / n, rms_slope=0.1, seed=1)
+        counts = []
+        for pressure in (0.0005, 0.005, 0.05, 0.1):
+            found = asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=pressure, boundary=boundary)
+            counts.append(f"{found.iterations} ({found.ffts}) at {100 * found.contact_area:.0f} %")
+        print(f"{n} x {n} cells, {boundary}: iterations (transforms) at contact {', '.join(counts)}")
+
+
 def main():
     """Run the chosen campaign."""
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong",
-                                         "long"])
+                                         "long", "edge"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -273,6 +286,8 @@ def main():
         oblong()
     elif given.what == "long":
         long()
+    elif given.what == "edge":
+        edge()
     elif given.what == "normal":
         campaign((normal_problem(rng) for _ in range(given.count)), asperity.solve_normal)
     else:

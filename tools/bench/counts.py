@@ -67,6 +67,8 @@ CASES = {
     + ROUGH.format(short=0.125, pressure=0.05),
     "rough, free": "&grid nx = 128, ny = 128, lx = 1.0, boundary = 'free' /"
     + ROUGH.format(short=16 / 128, pressure=0.005),
+    "rough, free, to the edge": "&grid nx = 192, ny = 150, lx = 1.0, boundary = 'free' /"
+    + ROUGH.format(short=12 / 192, pressure=0.05),
     "line contact": "&grid nx = 2048, ny = 1, lx = 1.0 /"
     + ROUGH.format(short=16 / 2048, pressure=0.005),
     "rough, method of the thesis": SQUARE.format(n=64, short=16 / 64, pressure=0.005)
