@@ -31,6 +31,7 @@ contains
       character(:), allocatable, intent(inout) :: message   !! a line is added; without the time
       real(dp) :: depth, least, near, range_of_edge
       logical :: adhesive
+      character(:), allocatable :: cells
       integer :: touching, wx, wy
 
       if (grid%boundary /= boundary_free) return
@@ -40,8 +41,9 @@ contains
       call scan_edge(grid, adhesive, [wx, wy], state, touching, least)
       if (touching > 0 .and. state%edge < edge_touches) then
          state%edge = edge_touches
-         call add_line(message, to_text(touching)//' cells at the edge of the free map touch; contact beyond '// &
-            'the map is left out: use a larger map')
+         cells = to_text(touching)//' cells at the edge of the free map touch'
+         if (touching == 1) cells = 'one cell at the edge of the free map touches'
+         call add_line(message, cells//'; contact beyond the map is left out: use a larger map')
       else if (any(abs(move) > 0.0_dp) .and. state%edge < edge_near) then
          range_of_edge = beyond_range*range
          if (least >= max(well_below*rms_height, range_of_edge)) return

@@ -60,7 +60,7 @@ def text_of(path: Path) -> str:
         If it is not a text file.
     """
     if not path.exists():
-        raise OSError(f"{path}: there is no such file")
+        raise FileNotFoundError(f"{path}: there is no such file")
     if path.is_dir():
         raise OSError(f"{path}: is a folder, not a file")
     data = path.read_bytes()

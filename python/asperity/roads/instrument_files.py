@@ -81,7 +81,7 @@ def _open(path: Path) -> Any:
     except ImportError:
         raise ImportError(f"SurfaceTopography is not installed: {_NEEDS}") from None
     if not path.exists():
-        raise OSError(f"{path}: there is no such file")
+        raise FileNotFoundError(f"{path}: there is no such file")
     if path.is_dir():
         raise OSError(f"{path}: is a folder, not a file")
     if not path.stat().st_size:

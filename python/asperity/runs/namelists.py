@@ -107,12 +107,20 @@ def source(case: Any) -> tuple[str, str]:
     """Return the name of a case's file, and its text, which is empty if it must be read from there.
 
     A case is a path, the text of an input, or an object with a ``path`` and the text ``str(case)``.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no file at a path.
     """
     require_case(case)
     if is_text(case):
         return "case.nml", str(case)
     if isinstance(case, str | os.PathLike):
-        return os.fspath(case), ""
+        path = os.fspath(case)
+        if not os.path.exists(path):
+            raise FileNotFoundError(f"{path}: there is no such file")
+        return path, ""
     return os.fspath(case.path or "case.nml"), str(case) or "\n"
 
 

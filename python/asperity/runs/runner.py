@@ -116,7 +116,7 @@ def run(
     >>> asperity.run("nowhere.nml")
     Traceback (most recent call last):
     ...
-    OSError: nowhere.nml: there is no such file
+    FileNotFoundError: nowhere.nml: there is no such file
     """
     threads = _checked(case, output, threads, restart and overwrite, callback)
     if not isinstance(case, str | os.PathLike):
