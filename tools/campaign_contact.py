@@ -260,9 +260,11 @@ def edge():
                                               wavelength_short=8 / n, rms_slope=0.1, seed=1)
         counts = []
         for pressure in (0.0005, 0.005, 0.05, 0.1):
-            found = asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=pressure, boundary=boundary)
+            found = asperity.solve_normal(height, 1.0, 1.0, 1.0, pressure=pressure,
+                                          boundary=boundary)
             counts.append(f"{found.iterations} ({found.ffts}) at {100 * found.contact_area:.0f} %")
-        print(f"{n} x {n} cells, {boundary}: iterations (transforms) at contact {', '.join(counts)}")
+        print(f"{n} x {n} cells, {boundary}: iterations (transforms) at contact",
+              ", ".join(counts))
 
 
 def main():

@@ -65,7 +65,7 @@ contains
       self%block_size = coarse%cells
       self%threads = threads
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
-         allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last), source=0._dp)
+         allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last), source=0.0_dp)
          width = coarse%sizes_x
          do j = first, last
             self%cells(:, j) = real(width*(coarse%first_y(j + 1) - coarse%first_y(j)), dp)

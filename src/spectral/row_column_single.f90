@@ -26,6 +26,6 @@ module row_column_single
 
    public :: block, new_row_column, row_column_type
 
-   include 'row_column.inc'      ! state 26340a98, written by tools/check_sources.py --update
+   include 'row_column.inc'      ! state cd3cf29d, written by tools/check_sources.py --update
 
 end module row_column_single

@@ -118,7 +118,7 @@ def source(case: Any) -> tuple[str, str]:
         return "case.nml", str(case)
     if isinstance(case, str | os.PathLike):
         path = os.fspath(case)
-        if not os.path.exists(path):
+        if not Path(path).exists():
             raise FileNotFoundError(f"{path}: there is no such file")
         return path, ""
     return os.fspath(case.path or "case.nml"), str(case) or "\n"
