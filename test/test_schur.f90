@@ -38,6 +38,10 @@ contains
          call preconditioner_is_the_schur_complement(boundary_free, 19, 21, 1.0_dp)
       end if
       if (selected('residual_is_extended_beyond_a_free_map')) call residual_is_extended_beyond_a_free_map()
+      if (selected('residual_is_extended_beyond_the_rim')) then
+         call residual_is_extended_beyond_the_rim(boundary_periodic)
+         call residual_is_extended_beyond_the_rim(boundary_free)
+      end if
       if (selected('contacts_at_the_edge_take_few_iterations')) then
          call contacts_at_the_edge_take_few_iterations(0.05_dp, 4e-3_dp)
          call contacts_at_the_edge_take_few_iterations(0.5_dp, 1e-1_dp)
@@ -82,27 +86,31 @@ contains
       end if
    end subroutine run_schur
 
-   !> Make a preconditioner, and its model B as a dense matrix.
-   subroutine new_setting(s, grid, b, mean_stiffness, beyond)
+   !> Make a preconditioner, and if asked for its model B as a dense matrix.
+   subroutine new_setting(s, grid, b, mean_stiffness, beyond, rim)
       type(setting_type), intent(out), target :: s
       type(grid_type), intent(in) :: grid
-      real(dp), allocatable, intent(out) :: b(:, :)
+      real(dp), allocatable, intent(out), optional :: b(:, :)
       real(dp), intent(in), optional :: mean_stiffness   !! at a given approach
       integer, intent(in), optional :: beyond            !! blocks beyond the edges; default: none
+      integer, intent(in), optional :: rim               !! wide blocks of the rim; default: the whole grid
       type(error_type), allocatable :: error
       real(dp) :: unit(grid%nx*grid%ny), form
-      integer :: i, more
+      integer :: blocks_of_rim, i, more
 
+      blocks_of_rim = max(grid%nx, grid%ny)
+      if (present(rim)) blocks_of_rim = rim
       more = 0
       if (present(beyond)) more = beyond
       s%grid = grid
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error, beyond=more)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse, .true., 1)
+      call new_active_blocks(s%active, s%grid, s%coarse, blocks_of_rim, 1)
       allocate (s%memory(grid%nx, grid%ny))
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), size(s%memory, kind=int64), error)
       call check_no_error(error, 'a preconditioner')
       if (present(mean_stiffness)) call s%preconditioner%blocks%stiffen_mean(mean_stiffness)
+      if (.not. present(b)) return
       allocate (b(size(unit), size(unit)))
       do i = 1, size(unit)
          unit(:) = 0.0_dp
@@ -216,6 +224,31 @@ contains
       end function widened
 
    end subroutine residual_is_extended_beyond_a_free_map
+
+   !> Beyond the rim the residual is extended as well, by one number per block: the energy falls in every step, and
+   !> remains r.M r.
+   subroutine residual_is_extended_beyond_the_rim(boundary)
+      integer, intent(in) :: boundary
+      integer, parameter :: nx = 120, ny = 96
+      type(setting_type), target :: s
+      real(dp) :: r(nx*ny), z(nx*ny), form, before
+      logical :: inside(nx*ny)
+      integer :: i, steps
+
+      call new_setting(s, new_grid(nx, ny, nx/1.0_dp, ny/1.0_dp, boundary), rim=1)
+      inside = [(modulo(i - 1, nx) < 20 .and. i <= 12*nx .and. modulo(7*i*i + 3*i, 11) < 7, i=1, nx*ny)]
+      r = merge([(1.3_dp + sin(1.7_dp*i), i=1, nx*ny)], 0.0_dp, inside)
+      before = huge(1.0_dp)
+      do steps = 0, 6
+         call apply(s, r, inside, steps, z, form)
+         call check_order(form, '<', before, 'every step lowers the energy')
+         call check_close(form, dot_product(pack(r, inside), pack(z, inside)), 1e-5_dp*form, 'the energy is r.M r')
+         before = form
+      end do
+      call check_order(sum(s%preconditioner%blocks%far), '>=', 0.4_dp*nx*ny, 'most cells lie beyond the rim')
+      call s%preconditioner%destroy()
+      call s%coarse%destroy()
+   end subroutine residual_is_extended_beyond_the_rim
 
    !> A rough contact that reaches the edge of a free map takes about as many iterations as a periodic one.
    subroutine contacts_at_the_edge_take_few_iterations(least, load)
@@ -413,7 +446,7 @@ contains
       s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse, .false., 1)
+      call new_active_blocks(s%active, s%grid, s%coarse, 0, 1)
       allocate (s%memory(nx, ny))
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), size(s%memory, kind=int64), error)
       call check_no_error(error, 'a preconditioner')
@@ -468,7 +501,7 @@ contains
          call s%active%survey_row(.true., j, pressure(:, j), gap(:, j), least)
       end do
       call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction)
-      call s%active%list_wide_runs(s%preconditioner%search, far=.false.)
+      call s%active%list_wide_runs(s%preconditioner%search)
       call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
       call s%preconditioner%extend(s%coarse, s%active, steps, form)
       do jb = s%coarse%strips(1), s%coarse%strips(2)

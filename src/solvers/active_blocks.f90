@@ -3,12 +3,10 @@
 !> A block is active if one of its cells has pressure, or a gap below a level. All other cells of the work fields
 !> are zero, so that a pass over the runs has the same effect as one over the whole grid.
 !>
-!> Around the active blocks lies a rim of about 32 cells, to which a preconditioner extends the residual. The rim
-!> consists of wide blocks: 16 cells by all rows of a coarse block, which are called a wide row. A wide block is
-!> in use if an active block is at most as far away as the rim is wide. With half of this rim the solver needs up
-!> to a third more iterations. Up to about 1024 x 1024 cells a wider rim does not reduce them. On larger grids the
-!> gaps between patches of contact are wider, and the far rim of a sixteenth of the longer side saves iterations.
-!> The wide blocks extend over the margin of a free grid (module `coarse_level`), too.
+!> Around the active blocks lies a rim, to which a preconditioner extends the residual cell by cell. It consists of wide
+!> blocks: 16 cells by all rows of a coarse block, which are called a wide row. A wide block is in use if it holds an active
+!> block or touches one that does. Beyond the rim the preconditioner has one number per coarse block, so that a wider rim
+!> saves no iterations. The wide blocks extend over the margin of a free grid (module `coarse_level`), too.
 module active_blocks
    use asperity_parallel, only : on_any_process
    use asperity_precision, only : dp, sp
@@ -20,9 +18,7 @@ module active_blocks
    public :: active_blocks_type, new_active_blocks
 
    integer, parameter :: width = 16            !! cells of a block
-   integer, parameter :: rim_x = 2             !! blocks of the rim along x ...
-   integer, parameter :: rim_y = 4             !! ... and wide rows along y, about as many cells
-   integer, parameter :: far_part = 16         !! the far rim is the longer side over this
+   integer, parameter, public :: rim_width = 1   !! wide blocks of the rim, along x and y
 
    !> The blocks of a grid.
    type :: active_blocks_type
@@ -30,8 +26,7 @@ module active_blocks
       integer, private :: rows = 0                 !! of this process
       integer, private :: threads = 1
       logical, private :: periodic = .false.
-      integer, private :: rim(2) = 0               !! along x and y
-      integer, private :: far_rim(2) = 0           !! the same, on large grids
+      integer, private :: rim = 0                  !! wide blocks around those that hold an active one
       integer, private :: strips(2) = 0            !! first and last wide row of this process
       integer, private :: columns(2) = 0           !! first and last column, with the margin
       integer, private :: all_rows(2) = 0          !! first and last row of this process, with the margin
@@ -52,6 +47,7 @@ module active_blocks
       procedure :: survey_row
       procedure :: list_runs
       procedure :: list_wide_runs
+      procedure :: same_runs
    end type active_blocks_type
 
 contains
@@ -61,7 +57,7 @@ contains
       type(active_blocks_type), intent(out) :: self
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse   !! whose rows of blocks are the wide rows
-      logical, intent(in) :: rim                   !! there is a rim
+      integer, intent(in) :: rim                   !! wide blocks of the rim
       integer, intent(in) :: threads
       integer :: blocks, wide_blocks
 
@@ -72,8 +68,7 @@ contains
       self%columns = coarse%columns
       self%all_rows = coarse%rows
       self%first_y = coarse%first_y
-      if (rim) self%rim = [rim_x, rim_y]
-      if (rim) self%far_rim = max(self%rim, max(grid%nx, grid%ny)/(far_part*width*rim_x)*self%rim)
+      self%rim = rim
       self%threads = threads
       blocks = (self%nx + width - 1)/width
       self%before = (coarse%margin(1) + width - 1)/width
@@ -197,18 +192,17 @@ contains
    end subroutine list_runs
 
    !> List the runs of wide blocks. Set the search direction to zero in those that are no longer in use.
-   subroutine list_wide_runs(self, search, far)
+   subroutine list_wide_runs(self, search)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: search(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
-      logical, intent(in) :: far                   !! with the far rim
       logical, allocatable :: used(:, :)
       integer :: b, j, k, first, last, n
       logical :: before
 
-      call find_used_blocks(self, merge(self%far_rim, self%rim, far), used)
+      call find_used_blocks(self, used)
       !$omp parallel do default(none) shared(self, search, used) private(b, j, k, first, last, n, before) &
       !$omp num_threads(self%threads)
-      do j = self%strips(1), self%strips(2)
+      do j = 1, size(used, 2)
          n = 0
          before = .false.
          do b = 1, size(used, 1)
@@ -220,7 +214,7 @@ contains
                   self%wide_first(n, j) = first
                end if
                self%wide_last(n, j) = last
-            else if (self%wide(b, j)) then
+            else if (self%wide(b, j) .and. j >= self%strips(1) .and. j <= self%strips(2)) then
                do k = self%first_y(j), self%first_y(j + 1) - 1
                   search(first:last, k) = 0.0_sp
                end do
@@ -232,10 +226,21 @@ contains
       end do
    end subroutine list_wide_runs
 
+   !> Do two wide rows have the same runs?
+   pure logical function same_runs(self, one, other)
+      class(active_blocks_type), intent(in) :: self
+      integer, intent(in) :: one, other
+
+      associate (n => self%wide_runs(one))
+         same_runs = self%wide_runs(other) == n
+         if (same_runs) same_runs = all(self%wide_first(:n, one) == self%wide_first(:n, other)) &
+            .and. all(self%wide_last(:n, one) == self%wide_last(:n, other))
+      end associate
+   end function same_runs
+
    !> Find the wide blocks that hold an active block or lie in its rim, on all processes. Collective.
-   subroutine find_used_blocks(self, rim, used)
+   subroutine find_used_blocks(self, used)
       type(active_blocks_type), intent(in) :: self
-      integer, intent(in) :: rim(2)                    !! in blocks along x and wide rows along y
       logical, allocatable, intent(out) :: used(:, :)  !! [blocks, wide rows]
       logical, allocatable :: stretched(:, :)
       integer :: b, j, k
@@ -254,15 +259,15 @@ contains
       end do
       ! The rim of a block may reach rows of other processes.
       used(:, :) = on_any_process(used)
-      !$omp parallel default(none) shared(self, used, stretched, rim) private(b, j) num_threads(self%threads)
+      !$omp parallel default(none) shared(self, used, stretched) private(b, j) num_threads(self%threads)
       !$omp do
       do j = 1, size(used, 2)
-         stretched(:, j) = dilated(used(:, j), rim(1), self%periodic)
+         stretched(:, j) = dilated(used(:, j), self%rim, self%periodic)
       end do
       !$omp end do
       !$omp do
       do b = 1, size(used, 1)
-         used(b, :) = dilated(stretched(b, :), rim(2), self%periodic)
+         used(b, :) = dilated(stretched(b, :), self%rim, self%periodic)
       end do
       !$omp end parallel
    end subroutine find_used_blocks

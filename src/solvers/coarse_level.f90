@@ -46,6 +46,7 @@ module coarse_level
       real(dp) :: h = 0.0_dp                       !! side of a square cell of the same area, m
       type(kernel_type) :: kernel                  !! normal response of the solid
       integer, allocatable :: block_x(:)           !! block of a cell along x, (columns(1):columns(2))
+      integer, allocatable :: first_x(:)           !! first column of a block, [nx]
       integer, allocatable :: sizes_x(:)           !! cells of a block along x, [nx]
       integer :: strips(2) = 0                     !! first and last row of blocks of the map on this process ...
       integer :: all_strips(2) = 0                 !! ... the same with the margin ...
@@ -130,8 +131,9 @@ contains
             self%block_x(i) = beyond + int(int(i - 1, kind=8)*blocks/grid%nx) + 1
          end if
       end do
-      allocate (self%sizes_x(self%nx), source=0)
-      do i = self%columns(1), self%columns(2)
+      allocate (self%first_x(self%nx), self%sizes_x(self%nx), source=0)
+      do i = self%columns(2), self%columns(1), -1
+         self%first_x(self%block_x(i)) = i
          self%sizes_x(self%block_x(i)) = self%sizes_x(self%block_x(i)) + 1
       end do
    end subroutine divide_columns

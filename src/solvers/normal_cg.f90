@@ -48,7 +48,7 @@ module normal_cg
    use finite_fields, only : reject_overflow
    use fft_conv, only : convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
-   use normal_iteration, only : choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, &
+   use normal_iteration, only : choose_direction, choose_step, end_loop, iteration_type, &
       phase_conjugate, phase_ended, phase_restart, sparse
    use normal_passes, only : as_formed, new_normal_work, normal_work_type, survey, update_state
    use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, fault_of_problem, &
@@ -197,7 +197,7 @@ contains
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
             call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction(:, :, as_formed))
-            call work%active%list_wide_runs(work%preconditioner%search, far=far_rim_pays(cells))
+            call work%active%list_wide_runs(work%preconditioner%search)
          end associate
       end subroutine measure_state
 

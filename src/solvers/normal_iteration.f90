@@ -35,7 +35,7 @@ module normal_iteration
    implicit none
    private
 
-   public :: choose_direction, choose_step, end_loop, far_rim_pays, iteration_type, phase_conjugate, phase_ended, &
+   public :: choose_direction, choose_step, end_loop, iteration_type, phase_conjugate, phase_ended, &
       phase_restart
 
    integer, parameter :: phase_restart = 1
@@ -57,8 +57,7 @@ module normal_iteration
 
    ! Steps by which the preconditioner extends the residual before and after the release of cells, for the numbers of cells
    ! of a grid from which they save time.
-   real(dp), parameter :: large = 1.5e6_dp
-   real(dp), parameter :: sizes(6) = [2e4_dp, 1.7e5_dp, large, 4e6_dp, 1.2e7_dp, 3e7_dp]
+   real(dp), parameter :: sizes(6) = [2e4_dp, 1.7e5_dp, 1.5e6_dp, 4e6_dp, 1.2e7_dp, 3e7_dp]
    integer, parameter :: steps_before(0:6) = [1, 1, 1, 2, 3, 4, 5]
    integer, parameter :: steps_after(0:6) = [1, 2, 3, 3, 4, 5, 6]
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
@@ -67,7 +66,7 @@ module normal_iteration
    ! A contact that is a part of the grid needs no more steps than a dense one on a smaller grid.
    real(dp), parameter :: light = 0.1_dp, dense = 0.5_dp   !! contact fractions between which the number of steps changes
    real(dp), parameter, public :: sparse = 0.03_dp   !! largest contact fraction of a sparse contact
-   integer, parameter :: largest_class = 2        !! of a sparse contact
+   integer, parameter :: largest_class = 3        !! of a sparse contact
    integer, parameter :: least_across = 1         !! cells across a free strip for which the model fits
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
@@ -97,13 +96,6 @@ contains
       now%phase = phase_ended
       now%reason = reason
    end subroutine end_loop
-
-   !> Does it save time to extend the residual to a wider rim around the contact?
-   pure logical function far_rim_pays(cells)
-      real(dp), intent(in) :: cells                    !! of the grid
-
-      far_rim_pays = cells >= large
-   end function far_rim_pays
 
    !> The place of a contact in the lists of steps. If the contact is less than half of the grid, the grid counts as one
    !> with fewer cells. The stencil fits oblong cells less well, and a line contact has many cells along its only

@@ -13,7 +13,7 @@ module schur_blocks
    use asperity_precision, only : dp
    use asperity_threads, only : least_parallel_cells
    use coarse_level, only : coarse_level_type
-   use schur_coarse, only : new_schur_coarse, om, schur_coarse_type
+   use schur_coarse, only : new_schur_coarse, om, schur_coarse_type, stencil_c0
    implicit none
    private
 
@@ -35,7 +35,12 @@ module schur_blocks
       real(dp), allocatable :: image_off(:, :)      !! b
       real(dp), allocatable :: response_off(:, :)   !! K d
       real(dp), allocatable, private :: search_off(:, :)   !! d
+      ! The cells beyond the rim, which belong to N, too, and where b and d are constant in a block:
+      real(dp), allocatable :: far(:, :)            !! their number
+      real(dp), allocatable, private :: far_image(:, :)    !! b
+      real(dp), allocatable, private :: far_search(:, :)   !! d
    contains
+      procedure :: add_far_image
       procedure :: stiffen_mean
       procedure :: image_parts
       procedure :: start
@@ -61,6 +66,7 @@ contains
          allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
          allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
          allocate (self%search_off(nx, first:last), self%coarse_image(nx, first:last), source=0.0_dp)
+         allocate (self%far(nx, first:last), self%far_image(nx, first:last), self%far_search(nx, first:last), source=0.0_dp)
       end associate
       call new_schur_coarse(self%model, coarse%outer, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
@@ -104,6 +110,8 @@ contains
       call add_coarse(self, coarse, coarse%cells, coarse%mean, self%pending)
       !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
       do j = coarse%held(1), coarse%held(2)
+         self%cells_off(:, j) = self%cells_off(:, j) + self%far(:, j)
+         self%far_image(:, j) = self%pending(:, j)
          rows(1, j) = sum(coarse%mean(:, j)*self%pending(:, j))
          rows(2, j) = sum(self%pending(:, j)*(2.0_dp*self%image_off(:, j) &
             + self%pending(:, j)*self%cells_off(:, j)))
@@ -113,6 +121,24 @@ contains
       square = totals(2)
       self%coarse_image(:, :) = self%pending
    end subroutine image_parts
+
+   !> Add the far cells to the sums on N, after others have formed those of the cells within the rim. Collective.
+   subroutine add_far_image(self, coarse, square)
+      class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(inout) :: square                  !! b^2 on N
+      real(dp) :: rows(1, coarse%held(1):coarse%held(2)), totals(1)
+      integer :: j
+
+      !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
+      do j = coarse%held(1), coarse%held(2)
+         self%image_off(:, j) = self%image_off(:, j) + self%far(:, j)*self%far_image(:, j)
+         self%cells_off(:, j) = self%cells_off(:, j) + self%far(:, j)
+         rows(1, j) = sum(self%far(:, j)*self%far_image(:, j)**2)
+      end do
+      totals = coarse%block_totals(rows)
+      square = square + totals(1)
+   end subroutine add_far_image
 
    !> Begin the conjugate gradients. Collective.
    subroutine start(self, coarse)
@@ -124,6 +150,7 @@ contains
       do j = coarse%held(1), coarse%held(2)
          self%image_off(:, j) = self%image_off(:, j) + self%pending(:, j)*self%cells_off(:, j)
          self%search_off(:, j) = 0.0_dp
+         self%far_search(:, j) = 0.0_dp
       end do
       call self%model%set_weights(self%cells_off, self%mean_stiffness)
    end subroutine start
@@ -156,6 +183,7 @@ contains
       do j = coarse%held(1), coarse%held(2)
          self%search_off(:, j) = self%correction(:, j)*self%cells_off(:, j) - om*self%image_off(:, j) &
             + beta*self%search_off(:, j)
+         self%far_search(:, j) = self%correction(:, j) - om*self%far_image(:, j) + beta*self%far_search(:, j)
       end do
       call add_coarse(self, coarse, 1.0_dp, self%search_off, self%addition)
    end subroutine form_direction
@@ -168,15 +196,17 @@ contains
       real(dp), intent(out) :: form                      !! to d.e
       real(dp), intent(out) :: cross                     !! to b.e on N
       real(dp), intent(out) :: square                    !! to e^2 on N
-      real(dp) :: rows(3, coarse%held(1):coarse%held(2)), totals(3)
+      real(dp) :: rows(3, coarse%held(1):coarse%held(2)), totals(3), far_sums(3)
       integer :: j
 
-      !$omp parallel do default(none) shared(self, coarse, rows) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, coarse, rows) private(j, far_sums) num_threads(self%threads)
       do j = coarse%held(1), coarse%held(2)
          self%pending(:, j) = 0.0_dp
-         rows(1, j) = sum(self%search_off(:, j)*self%addition(:, j))
-         rows(2, j) = sum(self%addition(:, j)*self%image_off(:, j))
-         rows(3, j) = sum(self%addition(:, j)*(2.0_dp*self%response_off(:, j) &
+         far_sums(:) = 0.0_dp
+         if (any(self%far(:, j) > 0.0_dp)) call add_far_response(self, j, far_sums)
+         rows(1, j) = far_sums(1) + sum(self%search_off(:, j)*self%addition(:, j))
+         rows(2, j) = far_sums(2) + sum(self%addition(:, j)*self%image_off(:, j))
+         rows(3, j) = far_sums(3) + sum(self%addition(:, j)*(2.0_dp*self%response_off(:, j) &
             + self%addition(:, j)*self%cells_off(:, j)))
       end do
       totals = coarse%block_totals(rows)
@@ -184,6 +214,21 @@ contains
       cross = totals(2)
       square = totals(3)
    end subroutine response_parts
+
+   !> Add the stencil's response of the far cells of a row of blocks to its sums. Only the part c0 of the stencil acts on a
+   !> constant.
+   pure subroutine add_far_response(self, j, sums)
+      class(schur_blocks_type), intent(inout) :: self
+      integer, intent(in) :: j                           !! row of blocks
+      real(dp), intent(out) :: sums(3)                   !! d.e, b.e and e^2
+      real(dp) :: response(size(self%far, 1))
+
+      response(:) = stencil_c0*self%far(:, j)*self%far_search(:, j)
+      self%response_off(:, j) = self%response_off(:, j) + response
+      sums(1) = sum(response*self%far_search(:, j))
+      sums(2) = sum(response*self%far_image(:, j))
+      sums(3) = sum(stencil_c0*response*self%far_search(:, j))
+   end subroutine add_far_response
 
    !> Take a step along the direction.
    subroutine advance(self, coarse, length)
@@ -196,6 +241,8 @@ contains
       do j = coarse%held(1), coarse%held(2)
          self%image_off(:, j) = self%image_off(:, j) + length*(self%response_off(:, j) &
             + self%addition(:, j)*self%cells_off(:, j))
+         self%far_image(:, j) = self%far_image(:, j) &
+            + length*(stencil_c0*self%far_search(:, j) + self%addition(:, j))
          self%pending(:, j) = length*self%addition(:, j)
          self%coarse_image(:, j) = self%coarse_image(:, j) + self%pending(:, j)
       end do

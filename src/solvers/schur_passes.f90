@@ -82,6 +82,7 @@ contains
                call residual_rows(self, coarse, active, jb, scale, level, pressure, gap)
             self%blocks%image_off(:, jb) = 0.0_dp
             self%blocks%cells_off(:, jb) = 0.0_dp
+            self%blocks%far(:, jb) = cells_beyond_rim(coarse, active, jb)
             call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
             if (jb - 1 > strips(1)) call image_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), rows)
          end do
@@ -101,6 +102,7 @@ contains
       call coarse%share_blocks(coarse%mean)
       call coarse%share_blocks(self%blocks%image_off)
       call coarse%share_blocks(self%blocks%cells_off)
+      call coarse%share_blocks(self%blocks%far)
       totals = row_totals(transpose(reshape([rows%form, rows%square], [size(rows), 2])))
       self%sums = image_sums_type(totals(1), totals(2))
    end subroutine residual_pass
@@ -129,6 +131,26 @@ contains
       call coarse%sum_blocks(column, coarse%mean(:, jb))
       coarse%mean(:, jb) = coarse%mean(:, jb)/coarse%cells
    end subroutine residual_rows
+
+   !> The number of cells beyond the rim in each block of a row of blocks.
+   pure function cells_beyond_rim(coarse, active, jb) result(cells)
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      real(dp) :: cells(coarse%nx)
+      integer :: b, k, columns
+
+      cells(:) = coarse%sizes_x
+      do k = 1, active%wide_runs(jb)
+         associate (first => active%wide_first(k, jb), last => active%wide_last(k, jb))
+            do b = coarse%block_x(first), coarse%block_x(last)
+               columns = min(last, coarse%first_x(b) + coarse%sizes_x(b) - 1) - max(first, coarse%first_x(b)) + 1
+               cells(b) = cells(b) - columns
+            end do
+         end associate
+      end do
+      cells(:) = (coarse%first_y(jb + 1) - coarse%first_y(jb))*cells
+   end function cells_beyond_rim
 
    !> Compute the image of the residual by K in some rows of a block.
    subroutine image_rows(self, coarse, active, jb, which, rows)
@@ -225,41 +247,125 @@ contains
                end if
             end associate
          end do
-         call close_row(self, self%search(:, j))
+         call close_runs(self, active, jb, self%search(:, j))
       end do
    end subroutine search_rows
 
    !> Compute the response to the search direction in some rows of a block.
    subroutine response_rows(self, coarse, active, jb, which, last, rows)
-      class(schur_fields_type), intent(inout) :: self
+      class(schur_fields_type), intent(inout), target :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb
       integer, intent(in) :: which(3)                    !! first and last row, and their distance
       logical, intent(in) :: last
       type(response_sums_type), intent(inout) :: rows(self%rows(1):)
-      real(sp), allocatable :: column(:)
+      real(sp), allocatable, target :: column(:), below(:), above(:)
+      real(sp), pointer, contiguous :: south(:), north(:)
       integer :: j, k, n
 
       if (active%wide_runs(jb) == 0) return
       allocate (column(self%columns(1):self%columns(2)), source=0.0_sp)
       do j = which(1), which(2), which(3)
+         south(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j - 1], below)
+         north(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j + 1], above)
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
                n = active%wide_last(k, jb) - first + 1
                if (last) then
-                  call last_response_cells(n, self%weights, self%search(first, j - 1), &
-                     self%search(first - 1, j), self%search(first, j + 1), self%response(first:, j), rows(j))
+                  call last_response_cells(n, self%weights, south(first:), self%search(first - 1, j), north(first:), &
+                     self%response(first:, j), rows(j))
                else
-                  call response_cells(n, self%weights, self%search(first, j - 1), &
-                     self%search(first - 1, j), self%search(first, j + 1), self%image(first:, j), &
-                     self%response(first:, j), column(first), rows(j))
+                  call response_cells(n, self%weights, south(first:), self%search(first - 1, j), north(first:), &
+                     self%image(first:, j), self%response(first:, j), column(first), rows(j))
                end if
             end associate
          end do
       end do
       if (.not. last) call add_blocks(coarse, column, self%blocks%response_off(:, jb))
    end subroutine response_rows
+
+   !> The row of the search direction beside one of a row of blocks. Where it lies beyond the rim, it has the values of the
+   !> row itself: the stencil does not join the cells of the rim with those beyond it, where d is constant in a block.
+   function row_beside(self, coarse, active, jb, j, edge) result(row)
+      class(schur_fields_type), intent(in), target :: self
+      type(coarse_level_type), intent(in) :: coarse
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      integer, intent(in) :: j(2)                        !! the row and the one beside it
+      real(sp), allocatable, intent(inout), target :: edge(:)   !! may be used for the result
+      real(sp), pointer, contiguous :: row(:)
+      integer :: beside
+
+      row => self%search(self%columns(1):self%columns(2), j(2))
+      if (j(2) >= coarse%first_y(jb) .and. j(2) < coarse%first_y(jb + 1)) return
+      beside = jb + j(2) - j(1)
+      if (self%grid%boundary == boundary_periodic) beside = modulo(beside - 1, coarse%ny) + 1
+      if (beside < 1 .or. beside > coarse%ny) return     ! beyond the margin, where the search direction is 0
+      if (active%same_runs(jb, beside)) return
+
+      if (.not. allocated(edge)) allocate (edge(self%columns(1):self%columns(2)))
+      call join_rows(active, jb, beside, self%search(self%columns(1):self%columns(2), j(1)), row, self%columns(1), edge)
+      row => edge
+   end function row_beside
+
+   !> Form a row that has the values of one row beside it, where that lies in the rim, and else those of the row itself. Only
+   !> the places in the runs of the row are set.
+   pure subroutine join_rows(active, jb, beside, own, other, first, row)
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      integer, intent(in) :: beside                      !! that of the row beside it
+      integer, intent(in) :: first                       !! column
+      real(sp), intent(in) :: own(first:), other(first:)
+      real(sp), intent(inout) :: row(first:)
+      integer :: from, k, m, runs
+
+      runs = active%wide_runs(beside)
+      m = 1
+      do k = 1, active%wide_runs(jb)
+         from = active%wide_first(k, jb)
+         associate (last => active%wide_last(k, jb))
+            row(from:last) = other(from:last)
+            do while (m <= runs .and. from <= last)
+               associate (a => active%wide_first(m, beside), b => active%wide_last(m, beside))
+                  if (a > last) exit
+                  row(from:a - 1) = own(from:a - 1)
+                  from = max(from, b + 1)
+                  if (b > last) exit
+               end associate
+               m = m + 1
+            end do
+            row(from:last) = own(from:last)
+         end associate
+      end do
+   end subroutine join_rows
+
+   !> Set the cells beside the ends of the runs of a row to those at the ends (see `row_beside`). On a periodic grid a run may
+   !> go on at the other end of the row; beyond the margin of a free grid the search direction remains 0.
+   pure subroutine close_runs(self, active, jb, row)
+      class(schur_fields_type), intent(in) :: self
+      type(active_blocks_type), intent(in) :: active
+      integer, intent(in) :: jb                          !! row of blocks
+      real(sp), intent(inout) :: row(self%columns(1) - 1:)
+      integer :: k, n
+
+      n = active%wide_runs(jb)
+      do k = 1, n
+         associate (a => active%wide_first(k, jb), b => active%wide_last(k, jb))
+            row(a - 1) = row(a)
+            row(b + 1) = row(b)
+         end associate
+      end do
+      if (self%grid%boundary /= boundary_periodic) then
+         row(self%columns(1) - 1) = 0.0_sp
+         row(self%columns(2) + 1) = 0.0_sp
+         return
+      end if
+      if (n == 0) return
+      if (active%wide_first(1, jb) > 1 .or. active%wide_last(n, jb) < self%grid%nx) return
+      row(0) = row(self%grid%nx)
+      row(self%grid%nx + 1) = row(1)
+   end subroutine close_runs
 
    !> The number of portions of the rows of blocks that threads pass one after the other. There are several for each
    !> thread, because some take longer than others.

@@ -73,6 +73,7 @@ contains
       call coarse%share_blocks(self%blocks%image_off)
       call coarse%share_blocks(self%blocks%cells_off)
       self%sums%square = row_total(squares)
+      call self%blocks%add_far_image(coarse, self%sums%square)
       self%blocks%pending(:, :) = 0.0_dp
       self%length = 0.0_sp
    end subroutine release_pass
