@@ -67,7 +67,6 @@ module normal_iteration
    real(dp), parameter :: light = 0.1_dp, dense = 0.5_dp   !! contact fractions between which the number of steps changes
    real(dp), parameter, public :: sparse = 0.03_dp   !! largest contact fraction of a sparse contact
    integer, parameter :: largest_class = 3        !! of a sparse contact
-   integer, parameter :: least_across = 1         !! cells across a free strip for which the model fits
 
    real(dp), parameter :: suspicious = 0.15_dp    !! beta from which directions may have lost their conjugacy
 
@@ -124,7 +123,7 @@ contains
       fixed_load = task%control == control_pressure
       now%free_mean = .not. fixed_load .and. work%grid%boundary == boundary_periodic
       stiffness = 0.0_dp
-      if (now%free_mean) stiffness = mean_stiffness(work, 1.0_dp - measure%contact, pressure)
+      if (now%free_mean) stiffness = mean_stiffness(work%grid%cells(), 1.0_dp - measure%contact)
       call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
       work%preconditioner%fixed_load = fixed_load

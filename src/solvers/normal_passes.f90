@@ -11,7 +11,7 @@ module normal_passes
    use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
    use normal_sweeps, only : direction_cells, load_cells, measure_cells, overlap_cells, spread_cells, trial_type
-   use asperity_precision, only : dp, pi, sp
+   use asperity_precision, only : dp, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
@@ -25,7 +25,6 @@ module normal_passes
    !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
    !> inverse compliance of an open cell that is surrounded by cells in contact.
    real(dp), parameter :: of_open_cells = 2.0_dp
-   real(dp), parameter :: stiffer = 5.0_dp     !! factor on the stiffness that the block means predict
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
    type :: normal_work_type
@@ -171,48 +170,19 @@ contains
       form = self%coarse%predict_form(row_total(squares))
    end function predict_form
 
-   !> The stiffness that the model has for the mean of v at a given approach on a periodic grid.
+   !> The stiffness that the model has for the mean of v at a given approach on a periodic grid, in the units of the model.
    !>
    !> The mean displacement is given then, so that B is infinite for the mean: v should have none. If the pressure of all
    !> cells in contact changes by the same amount, only the gaps of the open cells N change. A finite stiffness of about the
    !> inverse compliance of this change is therefore sufficient. With n cells it is
-   !>     n/(1_S.A 1_S),     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell)
-   !> where the second form holds for open cells that are far from each other. On a long grid large areas between the contacts
-   !> are open over the whole width, and the mean is much softer. The product then follows from the block means of the
-   !> contact. A stiffness that is much too large takes many more iterations there, because v is extended only to a rim
-   !> around the contact.
-   function mean_stiffness(self, open_part, pressure) result(stiffness)
-      type(normal_work_type), intent(inout) :: self
+   !>     n/(1_S.A 1_S),     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell),
+   !> where the second form holds for open cells that are far from each other.
+   pure real(dp) function mean_stiffness(cells, open_part)
+      real(dp), intent(in) :: cells                          !! of the grid
       real(dp), intent(in) :: open_part                      !! of the cells
-      real(dp), contiguous, intent(in) :: pressure(:, :)     !! Pa
-      real(dp) :: stiffness                                  !! in the units of the model
-      real(dp) :: cells, form
 
-      cells = self%grid%cells()
-      stiffness = of_open_cells/max(open_part, 1.0_dp/cells)
-      if (.not. self%grid%is_long()) return
-      call take_contact(self, pressure)
-      associate (coarse => self%coarse)
-         form = coarse%predict_form((1.0_dp - open_part)*cells)
-         if (form > 0.0_dp) stiffness = min(stiffness, stiffer*cells*pi*coarse%kernel%compliance(pi/coarse%h)/form)
-      end associate
+      mean_stiffness = of_open_cells/max(open_part, 1.0_dp/cells)
    end function mean_stiffness
-
-   !> Compute the block means of a field that is 1 where there is pressure, and 0 elsewhere.
-   subroutine take_contact(self, pressure)
-      type(normal_work_type), intent(inout) :: self
-      real(dp), contiguous, intent(in) :: pressure(:, :)     !! Pa
-      integer :: jb
-
-      !$omp parallel do default(none) shared(self, pressure) private(jb) schedule(dynamic) num_threads(self%threads)
-      do jb = self%coarse%strips(1), self%coarse%strips(2)
-         associate (first => self%coarse%first_y(jb), last => self%coarse%first_y(jb + 1) - 1)
-            call self%coarse%sum_blocks(real(count(pressure(:, first:last) > 0.0_dp, dim=2), dp), self%coarse%mean(:, jb))
-         end associate
-         self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
-      end do
-      call self%coarse%share_blocks(self%coarse%mean)
-   end subroutine take_contact
 
    !> Compute the direction in a row.
    subroutine direction_row(self, preconditioned, beta, j, pressure, correction, sums)

@@ -19,7 +19,6 @@ module schur_blocks
 
    public :: new_schur_blocks, schur_blocks_type
 
-
    !> The numbers per block. A variable of this type must not be copied.
    type :: schur_blocks_type
       type(schur_coarse_type) :: model            !! the coarse part of the model
@@ -27,7 +26,6 @@ module schur_blocks
       real(dp), private :: mean_stiffness = 0.0_dp   !! that the model adds for the mean of v over the grid
       real(dp), private :: cells = 1.0_dp            !! of the grid
       real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
-      real(dp), allocatable :: coarse_image(:, :) !! coarse part of B v
       real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
       real(dp), allocatable, private :: addition(:, :)   !! coarse part of B d
       ! Sums over the cells of N in each block:
@@ -65,7 +63,7 @@ contains
          allocate (self%pending(nx, first:last), self%correction(nx, first:last), source=0.0_dp)
          allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
          allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
-         allocate (self%search_off(nx, first:last), self%coarse_image(nx, first:last), source=0.0_dp)
+         allocate (self%search_off(nx, first:last), source=0.0_dp)
          allocate (self%far(nx, first:last), self%far_image(nx, first:last), self%far_search(nx, first:last), source=0.0_dp)
       end associate
       call new_schur_coarse(self%model, coarse%outer, coarse%h, coarse%nx, coarse%sharing, threads, error)
@@ -119,7 +117,6 @@ contains
       totals = coarse%block_totals(rows)
       form = coarse%cells*totals(1)
       square = totals(2)
-      self%coarse_image(:, :) = self%pending
    end subroutine image_parts
 
    !> Add the far cells to the sums on N, after others have formed those of the cells within the rim. Collective.
@@ -244,7 +241,6 @@ contains
          self%far_image(:, j) = self%far_image(:, j) &
             + length*(stencil_c0*self%far_search(:, j) + self%addition(:, j))
          self%pending(:, j) = length*self%addition(:, j)
-         self%coarse_image(:, j) = self%coarse_image(:, j) + self%pending(:, j)
       end do
    end subroutine advance
 

@@ -38,8 +38,7 @@ module schur_long_waves
       logical :: matter = .false.                      !! the grid is long, or free
       integer, private :: threads = 1
       real(dp), private :: block_size = 1.0_dp         !! cells of a block, on average
-      real(dp), allocatable, private :: cells(:, :)    !! cells of each block, (nx, held rows of blocks)
-      real(dp), allocatable, private :: inside(:, :)   !! those in contact
+      real(dp), allocatable, private :: inside(:, :)   !! cells of each block in contact, (nx, held rows of blocks)
       real(dp), allocatable, private :: acting(:, :)   !! those in which the direction acts
       type(convolution_type), private :: smoother
    contains
@@ -57,7 +56,6 @@ contains
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
-      integer :: width(coarse%nx), j
 
       if (allocated(error)) return
       self%matter = min(grid%nx, grid%ny) > 1 .and. (grid%boundary /= boundary_periodic .or. grid%is_long())
@@ -65,11 +63,7 @@ contains
       self%block_size = coarse%cells
       self%threads = threads
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
-         allocate (self%cells(nx, first:last), self%inside(nx, first:last), self%acting(nx, first:last), source=0.0_dp)
-         width = coarse%sizes_x
-         do j = first, last
-            self%cells(:, j) = real(width*(coarse%first_y(j + 1) - coarse%first_y(j)), dp)
-         end do
+         allocate (self%inside(nx, first:last), self%acting(nx, first:last), source=0.0_dp)
       end associate
       call new_symbol_operator(self%smoother, shape_of_rows(coarse%nx, coarse%sharing, 1), error, single=.true.)
       if (.not. allocated(error)) call set_symbols(self, grid, coarse)
@@ -99,16 +93,14 @@ contains
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       real(dp), intent(in) :: offset                   !! number by which the step lowers the direction
-      real(sp), intent(in) :: residual(coarse%columns(1)-1:, coarse%rows(1)-1:)         !! not 0 in contact
+      real(sp), intent(in) :: residual(coarse%columns(1) - 1:, coarse%rows(1) - 1:)   !! not 0 in contact
       real(sp), intent(in) :: direction(:, :)          !! before the change, not 0 where it acts
       type(schur_blocks_type), intent(inout) :: blocks
       real(dp), dimension(coarse%nx, coarse%held(1):coarse%held(2)) :: missing, nearby, smoothed
 
       call count_cells(self, coarse, active, residual, direction)
-      ! What the step lacks, summed over the cells of a block. The offset is part of the step. Far from the contact b has
-      ! only its coarse part.
-      missing(:, :) = offset*self%acting + blocks%image_off &
-         + (self%cells - self%inside - blocks%cells_off)*blocks%coarse_image
+      ! What the step lacks, summed over the cells of a block. The offset is part of the step.
+      missing(:, :) = offset*self%acting + blocks%image_off
 
       call self%smoother%apply(self%inside, nearby)
       missing(:, :) = missing/max(nearby, least_share*coarse%cells)
@@ -121,7 +113,7 @@ contains
       type(long_waves_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
-      real(sp), intent(in) :: residual(coarse%columns(1)-1:, coarse%rows(1)-1:), direction(:, :)
+      real(sp), intent(in) :: residual(coarse%columns(1) - 1:, coarse%rows(1) - 1:), direction(:, :)
       real(sp) :: inside(coarse%columns(1):coarse%columns(2)), acting(coarse%columns(1):coarse%columns(2))
       integer :: j, jb, k
 

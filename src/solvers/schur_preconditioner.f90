@@ -28,10 +28,16 @@
 !>
 !> For very oblong cells the stencil is too inaccurate, and module `wave_preconditioner` forms M r.
 !>
-!> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. N is restricted to a
-!> rim around the contact (the wide blocks of module `active_blocks`). The rim goes on beyond the edges of a free map, where
-!> the solid does (the margin of module `coarse_level`); if v were 0 there, contacts that reach the edge would take up to
-!> three times as many iterations. Memory: five such fields, of which two lie in memory that the caller lends.
+!> Only in a narrow rim around the contact (the wide blocks of module `active_blocks`) does each cell of N have its own v.
+!> Beyond the rim v is constant in a block, so that distant cells cost no passes. If v were 0 there, the model would be too
+!> stiff for long waves, and large grids would need a wide rim. The stencil does not join cells of the rim with those beyond
+!> it: their difference would otherwise cost much more than the smooth v that both stand for.
+!>
+!> N goes on beyond the edges of a free map, where the solid does (the margin of module `coarse_level`). If v were 0
+!> there, contacts that reach the edge would take up to three times as many iterations.
+!>
+!> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. Memory: five such fields, of which two
+!> lie in memory that the caller lends.
 module schur_preconditioner
    use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
    use active_blocks, only : active_blocks_type
