@@ -240,17 +240,23 @@ def long():
     side = 1e-3
     for ratio in (1, 4, 16, 64, 256):
         nx, ny = round(1024 * ratio**0.5), round(1024 / ratio**0.5)
-        counts = []
-        for pressure, seed in itertools.product((0.0005, 0.005, 0.05), (1, 2)):
+        counts = {"pressure": [], "displacement": []}
+        for seed in (1, 2):
             height = asperity.surface.self_affine(
                 nx, ny, lx=nx * side, ly=ny * side, hurst=0.5, wavelength_long=ny * side / 2,
                 wavelength_short=6 * side, rms_slope=0.1, seed=seed)
-            try:
-                found = asperity.solve_normal(height, nx * side, ny * side, 1.0, pressure=pressure)
-                counts.append(f"{found.iterations}")
-            except asperity.NotConverged:
-                counts.append("not converged")
-        print(f"{nx} x {ny} cells: iterations {', '.join(counts)}")
+            depth = height.max() - height.mean()
+            for control, value in itertools.chain(
+                    (("pressure", p) for p in (0.0005, 0.005, 0.05)),
+                    (("displacement", part * depth) for part in (0.2, 0.5, 0.8))):
+                try:
+                    found = asperity.solve_normal(height, nx * side, ny * side, 1.0,
+                                                  **{control: value})
+                    counts[control].append(f"{found.iterations}")
+                except asperity.NotConverged:
+                    counts[control].append("not converged")
+        for control, numbers in counts.items():
+            print(f"{nx} x {ny} cells, {control}: iterations {', '.join(numbers)}")
 
 
 def edge():

@@ -86,6 +86,35 @@ def test_the_reported_error_is_that_of_the_gap(tolerance):
     assert level - gap.min() <= 1.01 * tolerance * height.std()
 
 
+@pytest.mark.parametrize("method", ["fast", "thesis"])
+@pytest.mark.parametrize("approach", [1e-6, 1e-5])
+def test_a_small_approach_on_high_plateaus(approach, method):
+    """The error is relative to the displacement, which here is far below the rms height."""
+    rng = np.random.default_rng(0)
+    height = -1.0 * (rng.random((64, 64)) < 0.3) + 1e-5 * rng.normal(size=(64, 64))
+    forces = [asperity.solve_normal(height, 1.0, 1.0, 1.0, displacement=approach, method=method,
+                                    tolerance=tolerance).force for tolerance in (1e-4, 1e-9)]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-2)
+
+
+@pytest.mark.parametrize("method", ["fast", "thesis"])
+def test_a_limit_of_iterations_is_not_convergence(method):
+    """An error far below the rms height can be large relative to the displacement."""
+    height = np.zeros((32, 32))
+    height[12:20, 12:20] = 1.0 - 1e-5 * np.hypot(*np.mgrid[-3.5:4, -3.5:4])
+    given = {"displacement": 1e-6, "tolerance": 1e-4, "method": method}
+    force = asperity.solve_normal(height, 1.0, 1.0, 1.0, **given).force
+    stopped = 0
+    for limit in range(1, 12):
+        try:
+            found = asperity.solve_normal(height, 1.0, 1.0, 1.0, max_iterations=limit, **given)
+        except asperity.NotConverged as error:
+            stopped += error.result.residual <= 1e-4
+        else:
+            assert found.force == pytest.approx(force, rel=1e-2)
+    assert stopped
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 def test_long_grid_of_oblong_cells(seed):
     """A strip a hundred times as long as wide, whose cells are fifteen times as long as wide."""

@@ -46,6 +46,7 @@ module normal_state
    type :: gap_measure_type
       real(dp) :: level = 0.0_dp            !! mean of U - H + datum over P > 0, or the prescribed one, m
       real(dp) :: weighted_level = 0.0_dp   !! mean of U - H + datum weighted by P, or the prescribed one, m
+      real(dp) :: reached = 0.0_dp          !! mean of U - H + datum weighted by P, m; 0 without load
       real(dp) :: load = 0.0_dp             !! sum of P over the cells, Pa
       real(dp) :: contact = 0.0_dp          !! part of the cells with P > 0
       real(dp) :: load_error = 0.0_dp       !! relative
@@ -157,7 +158,9 @@ contains
    !>
    !> If the contact is small on a tall map, such as on the summit of a sphere, the rms height is not a useful scale,
    !> and ten times the mean displacement under the load is used instead. For a rough contact the scale is the rms
-   !> height. Without any pressure, at a given approach, the displacement that is missing is the overlap.
+   !> height. The displacement is that of the present pressure, also at a given approach: with the level that is prescribed
+   !> but not yet reached it could be far too small, or even negative. Without any pressure, at a given approach, the
+   !> displacement that is missing is the overlap.
    subroutine narrow_scale(task, height, pressure, threads, measure)
       type(normal_problem_type), intent(inout) :: task
       real(dp), intent(in) :: height(:, :), pressure(:, :)
@@ -173,7 +176,7 @@ contains
          do j = 1, size(height, 2)
             rows(j) = row_product(height(:, j) - task%datum, pressure(:, j))
          end do
-         displacement = row_total(rows)/measure%load + measure%weighted_level
+         displacement = row_total(rows)/measure%load + measure%reached
       else if (task%control == control_approach) then
          displacement = measure%duality_gap
       else
@@ -213,6 +216,7 @@ contains
 
       measure%load = sums%load
       measure%contact = sums%cells/cells
+      if (sums%load > 0.0_dp) measure%reached = sums%work/sums%load
       if (problem%control == control_approach) then
          measure%level = problem%target
          measure%weighted_level = problem%target
@@ -221,7 +225,7 @@ contains
             measure%duality_gap = max(measure%duality_gap, sums%distance/sums%load)
       else if (sums%load > 0.0_dp) then
          measure%level = sums%touched/sums%cells
-         measure%weighted_level = sums%work/sums%load
+         measure%weighted_level = measure%reached
          measure%load_error = abs(sums%load/(cells*problem%target) - 1.0_dp)
          measure%duality_gap = measure%weighted_level - sums%least
       else
@@ -398,7 +402,7 @@ contains
       integer :: j
 
       outcome%required = max(task%tolerance, task%accepted)
-      outcome%converged = determined .and. measure%error <= outcome%required
+      outcome%converged = determined .and. measure%strict <= outcome%required
       if (outcome%converged) outcome%reason = reason_converged
       outcome%residual = measure%error
       outcome%load_error = measure%load_error
