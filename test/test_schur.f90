@@ -105,7 +105,7 @@ contains
       s%grid = grid
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error, beyond=more)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse, blocks_of_rim, 1)
+      call new_active_blocks(s%active, s%grid, s%coarse, [blocks_of_rim, blocks_of_rim], 1)
       allocate (s%memory(grid%nx, grid%ny))
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), size(s%memory, kind=int64), error)
       call check_no_error(error, 'a preconditioner')
@@ -446,7 +446,7 @@ contains
       s%grid = new_grid(nx, ny, 1.0_dp, aspect*ny/nx, boundary)
       call new_coarse_level(s%coarse, s%grid, normal_half_space(0.3_dp), error)
       call check_no_error(error, 'a coarse level')
-      call new_active_blocks(s%active, s%grid, s%coarse, 0, 1)
+      call new_active_blocks(s%active, s%grid, s%coarse, [0, 0], 1)
       allocate (s%memory(nx, ny))
       call new_schur_preconditioner(s%preconditioner, s%grid, s%coarse, 1, c_loc(s%memory), size(s%memory, kind=int64), error)
       call check_no_error(error, 'a preconditioner')

@@ -4,7 +4,7 @@
 !> They visit the active blocks only (module `active_blocks`), except the pass that updates the gap. The
 !> work fields are zero elsewhere. The innermost loops are in module `normal_sweeps`.
 module normal_passes
-   use active_blocks, only : active_blocks_type, new_active_blocks, rim_width
+   use active_blocks, only : active_blocks_type, new_active_blocks, usual_rim
    use coarse_level, only : coarse_level_type, new_coarse_level
    use asperity_errors, only : error_type
    use fft_conv, only : convolution_type
@@ -58,7 +58,7 @@ contains
          self%threads, operator%spectrum_memory(), operator%spectrum_length(), error)
       allocate (self%direction(self%grid%nx, self%grid%rows(), merge(lowered, as_formed, self%preconditioner%by_waves)))
       if (.not. allocated(error)) call new_active_blocks(self%active, self%grid, self%coarse, &
-         merge(0, rim_width, self%preconditioner%by_waves), self%threads)
+         merge(0, usual_rim, self%preconditioner%by_waves), self%threads)
    end subroutine new_normal_work
 
    !> Find out which blocks have pressure, the least gap of each block, and the sums of the state.
