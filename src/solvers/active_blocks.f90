@@ -7,7 +7,9 @@
 !> blocks: 16 cells by all rows of a coarse block, which are called a wide row. A wide block is in use if an active block
 !> is at most as far away as the rim is wide, about 16 cells. Beyond the rim the preconditioner has one number per coarse
 !> block, so that a wider rim saves no iterations. With half as many rows a contact of 8192 x 8192 cells, of which three
-!> quarters touch, takes half as many iterations again. The wide blocks extend over the margin of a free grid (module `coarse_level`), too.
+!> quarters touch, takes half as many iterations again.
+!>
+!> The wide blocks extend over the margin of a free grid (module `coarse_level`), too.
 module active_blocks
    use asperity_parallel, only : on_any_process
    use asperity_precision, only : dp, sp
