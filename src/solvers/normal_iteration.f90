@@ -63,6 +63,10 @@ module normal_iteration
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
    real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
    integer, parameter :: least_class = 2          !! of oblong cells and line contacts
+   ! On a long or free grid the cells whose trial pressure is negative after a release are released, too.
+   integer, parameter :: most_releases = 3
+   real(dp), parameter :: negligible = 1e-5_dp   !! negative part of a trial pressure that is only clipped
+
    ! A contact that is a part of the grid needs no more steps than a dense one on a smaller grid.
    real(dp), parameter :: light = 0.1_dp, dense = 0.5_dp   !! contact fractions between which the number of steps changes
    real(dp), parameter, public :: sparse = 0.03_dp   !! largest contact fraction of a sparse contact
@@ -97,13 +101,16 @@ contains
    end subroutine end_loop
 
    !> The place of a contact in the lists of steps. If the contact is less than half of the grid, the grid counts as one
-   !> with fewer cells. The stencil fits oblong cells less well, and a line contact has many cells along its only
-   !> direction: they need more steps.
+   !> with fewer cells, and a grid that is longer than wide as one with more. The stencil fits oblong cells less well: they
+   !> need more steps.
    pure integer function size_class(grid, contact)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: contact                  !! fraction of the cells
+      real(dp) :: longer
 
-      size_class = count(sqrt(min(max(contact, light)/dense, 1.0_dp))*grid%cells() >= sizes)
+      longer = max(grid%lx, grid%ly)/grid%cell_side()
+      if (min(grid%nx, grid%ny) == 1) longer = max(grid%nx, grid%ny)
+      size_class = count(sqrt(min(max(contact, light)/dense, 1.0_dp)*grid%cells())*longer >= sizes)
       if (contact <= sparse) size_class = min(size_class, largest_class)
       if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong .or. min(grid%nx, grid%ny) == 1) &
          size_class = max(size_class, least_class)
@@ -188,9 +195,11 @@ contains
       if (now%phase == phase_ended) return
       fixed_load = task%control == control_pressure
       alpha = trial_length(work, task%modulus, now)
-      if (is_releasing(now)) call work%preconditioner%release(work%coarse, work%active, &
-         steps_after(now%class), trial_type(alpha, work%offset), pressure, work%direction(:, :, as_formed))
-      call try_pressure(work, alpha, pressure, trial)
+      if (is_releasing(now)) then
+         call release_and_try(work, task, alpha, now%class, pressure, trial)
+      else
+         call try_pressure(work, alpha, pressure, trial)
+      end if
       if (trial%cells < 1.0_dp .and. fixed_load) then
          call shorten(now)
          return
@@ -205,6 +214,36 @@ contains
          call shorten(now)
       end if
    end subroutine choose_step
+
+   !> Release the cells with a negative trial pressure, and form the trial pressure.
+   !>
+   !> The change of the direction makes other cells negative. On most grids it is enough that the projection clips them. But
+   !> the load that this takes from the contact around them returns to the whole of it, and on a long grid the energy of such
+   !> an error of the longest waves is so large that little of the step can be taken, and hardly a cell leaves the contact.
+   !> There, and on free grids, such cells are released in their turn.
+   subroutine release_and_try(work, task, alpha, class, pressure, trial)
+      type(normal_work_type), intent(inout) :: work
+      type(normal_problem_type), intent(in) :: task
+      real(dp), intent(in) :: alpha
+      integer, intent(in) :: class
+      real(dp), contiguous, intent(in) :: pressure(:, :)
+      type(trial_sums_type), intent(out) :: trial
+      real(dp) :: surplus
+      integer :: k
+
+      do k = 1, most_releases
+         call work%preconditioner%release(work%coarse, work%active, steps_after(class), trial_type(alpha, work%offset), &
+            pressure, work%direction(:, :, as_formed))
+         call try_pressure(work, alpha, pressure, trial)
+         if (k == most_releases .or. .not. work%preconditioner%keeps_long_waves()) exit
+         if (-trial%below <= negligible*trial%above) exit
+
+         if (task%control == control_pressure) then
+            surplus = trial%above + trial%below - task%target*work%grid%cells()
+            work%offset = work%offset + surplus/(alpha*trial%cells)
+         end if
+      end do
+   end subroutine release_and_try
 
    !> Does this iteration release cells? Not if its direction is a plain one.
    pure logical function is_releasing(now)

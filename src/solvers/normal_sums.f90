@@ -22,6 +22,7 @@ module normal_sums
    !> Sums of a trial pressure above a limit.
    type :: trial_sums_type
       real(dp) :: above = 0.0_dp            !! sum of the parts above the limit, Pa
+      real(dp) :: below = 0.0_dp            !! sum of the parts below it, after a release of cells, Pa
       real(dp) :: cells = 0.0_dp            !! number of cells above the limit
       real(dp) :: least = 0.0_dp            !! least trial pressure, at most 0, Pa
    end type trial_sums_type
@@ -63,10 +64,10 @@ contains
    function total_trial(rows) result(sums)
       type(trial_sums_type), intent(in) :: rows(:)
       type(trial_sums_type) :: sums
-      real(dp) :: t(2)
+      real(dp) :: t(3)
 
-      t = totals_of([rows%above, rows%cells], 2)
-      sums = trial_sums_type(above=t(1), cells=t(2), least=least_of_rows([rows%least]))
+      t = totals_of([rows%above, rows%below, rows%cells], 3)
+      sums = trial_sums_type(above=t(1), below=t(2), cells=t(3), least=least_of_rows([rows%least]))
    end function total_trial
 
    !> Sums of a step over the grid.

@@ -206,16 +206,17 @@ contains
       real(dp), intent(in) :: pressure(n)
       real(sp), intent(inout) :: direction(n)
       type(trial_sums_type), intent(inout) :: sums
-      real(dp) :: alpha, lowered, total, cells, lowest, kept, value
+      real(dp) :: alpha, lowered, total, negative, cells, lowest, kept, value
       real(sp) :: d, inside
       integer :: i
 
       alpha = trial%alpha
       lowered = trial%lowered()
       total = 0.0_dp
+      negative = 0.0_dp
       cells = 0.0_dp
       lowest = sums%least
-      !$omp simd reduction(+:total, cells) reduction(min:lowest) private(d, inside, kept, value)
+      !$omp simd reduction(+:total, negative, cells) reduction(min:lowest) private(d, inside, kept, value)
       do i = 1, n
          inside = acts(residual(i))*acts(direction(i))
          d = inside*(direction(i) + (image(i) + length*response(i) + correction(i)))
@@ -223,10 +224,12 @@ contains
          kept = inside
          value = trial_of(alpha, lowered, pressure(i), d)
          total = total + max(value, 0.0_dp)
+         negative = negative + min(value, 0.0_dp)
          cells = cells + positive(value)
          lowest = min(lowest, value - (1.0_dp - kept)*pressure(i))
       end do
       sums%above = sums%above + total
+      sums%below = sums%below + negative
       sums%cells = sums%cells + cells
       sums%least = lowest
    end subroutine changed_trial_cells

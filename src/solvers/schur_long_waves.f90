@@ -14,8 +14,11 @@
 !> so that all of the rest arrives in the contact. It spreads over the shorter side of the grid, with a tail that
 !> falls like the displacement beside a load and reaches the contact wherever it is.
 !>
-!> This holds for a given load only. At a given approach, what is left outside the contact changes the load itself, and
-!> giving it to the contact made many contacts slower.
+!> At a given approach on a periodic grid a uniform pressure strains nothing, and the load is whatever the contact nearby
+!> takes. The mean of the rest is not given to the contact then: it made sparse contacts several times slower.
+!>
+!> Where cells are released several times in a step (module `normal_iteration`), each call gives what has been left since
+!> the call before.
 module schur_long_waves
    use active_blocks, only : active_blocks_type
    use asperity_errors, only : error_type
@@ -36,12 +39,16 @@ module schur_long_waves
    !> The correction. A variable of this type must not be copied.
    type :: long_waves_type
       logical :: matter = .false.                      !! the grid is long, or free
+      real(dp), allocatable :: restored(:, :)          !! part of the step on the contact, (nx, held rows of blocks)
+      logical, private :: first = .true.               !! the next call is the first one of a step
       integer, private :: threads = 1
       real(dp), private :: block_size = 1.0_dp         !! cells of a block, on average
       real(dp), allocatable, private :: inside(:, :)   !! cells of each block in contact, (nx, held rows of blocks)
       real(dp), allocatable, private :: acting(:, :)   !! those in which the direction acts
+      real(dp), allocatable, private :: given(:, :)    !! rest that the calls before have given
       type(convolution_type), private :: smoother
    contains
+      procedure :: begin
       procedure :: restore
       procedure :: transforms
       procedure :: destroy
@@ -64,6 +71,7 @@ contains
       self%threads = threads
       associate (nx => coarse%nx, first => coarse%held(1), last => coarse%held(2))
          allocate (self%inside(nx, first:last), self%acting(nx, first:last), source=0.0_dp)
+         allocate (self%restored(nx, first:last), self%given(nx, first:last), source=0.0_dp)
       end associate
       call new_symbol_operator(self%smoother, shape_of_rows(coarse%nx, coarse%sharing, 1), error, single=.true.)
       if (.not. allocated(error)) call set_symbols(self, grid, coarse)
@@ -87,26 +95,57 @@ contains
       call self%smoother%set_symbol(symbol)
    end subroutine set_symbols
 
-   !> Add what the step lacks in the cells outside the contact to the coarse part of the direction. Collective.
-   subroutine restore(self, coarse, active, offset, residual, direction, blocks)
+   !> Begin a step.
+   pure subroutine begin(self)
+      class(long_waves_type), intent(inout) :: self
+
+      self%first = .true.
+   end subroutine begin
+
+   !> Find what the step lacks in the cells outside the contact, as a part of the step on the contact. Collective.
+   subroutine restore(self, coarse, active, free_mean, offset, residual, direction, blocks)
       class(long_waves_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
+      logical, intent(in) :: free_mean                 !! a uniform pressure strains nothing, and the load is not given
       real(dp), intent(in) :: offset                   !! number by which the step lowers the direction
       real(sp), intent(in) :: residual(coarse%columns(1) - 1:, coarse%rows(1) - 1:)   !! not 0 in contact
       real(sp), intent(in) :: direction(:, :)          !! before the change, not 0 where it acts
-      type(schur_blocks_type), intent(inout) :: blocks
-      real(dp), dimension(coarse%nx, coarse%held(1):coarse%held(2)) :: missing, nearby, smoothed
+      type(schur_blocks_type), intent(in) :: blocks
+      real(dp), dimension(coarse%nx, coarse%held(1):coarse%held(2)) :: missing, nearby
 
       call count_cells(self, coarse, active, residual, direction)
       ! What the step lacks, summed over the cells of a block. The offset is part of the step.
-      missing(:, :) = offset*self%acting + blocks%image_off
+      if (self%first) then
+         missing(:, :) = offset*self%acting + blocks%image_off
+      else
+         missing(:, :) = blocks%image_off - self%given
+      end if
+      self%given(:, :) = blocks%image_off
+      self%first = .false.
+      if (free_mean) missing(:, :) = missing - self%inside*(sum_of_blocks(coarse, missing) &
+         /max(sum_of_blocks(coarse, self%inside), 1.0_dp))
 
       call self%smoother%apply(self%inside, nearby)
       missing(:, :) = missing/max(nearby, least_share*coarse%cells)
-      call self%smoother%apply(missing, smoothed)
-      where (self%inside > 0.0_dp) blocks%pending = blocks%pending + smoothed
+      call self%smoother%apply(missing, self%restored)
+      where (.not. self%inside > 0.0_dp) self%restored = 0.0_dp
    end subroutine restore
+
+   !> The sum of numbers per block over the grid. Collective.
+   function sum_of_blocks(coarse, numbers) result(total)
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(in) :: numbers(:, :)
+      real(dp) :: total
+      real(dp) :: rows(1, size(numbers, 2)), totals(1)
+      integer :: j
+
+      do j = 1, size(numbers, 2)
+         rows(1, j) = sum(numbers(:, j))
+      end do
+      totals = coarse%block_totals(rows)
+      total = totals(1)
+   end function sum_of_blocks
 
    !> Count the cells of each block in contact, and those in which the direction acts.
    subroutine count_cells(self, coarse, active, residual, direction)

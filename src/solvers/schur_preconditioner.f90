@@ -45,7 +45,7 @@ module schur_preconditioner
    use asperity_errors, only : error_type
    use asperity_precision, only : dp, int64, pi, sp
    use normal_sweeps, only : trial_type
-   use regular_grid, only : grid_type
+   use regular_grid, only : boundary_periodic, grid_type
    use row_halo, only : new_rim_halo
    use schur_blocks, only : new_schur_blocks
    use schur_coarse, only : om, stencil_c0, stencil_c1
@@ -77,6 +77,7 @@ module schur_preconditioner
       procedure :: set_residual
       procedure :: extend
       procedure :: release
+      procedure :: keeps_long_waves
       procedure :: correction
       procedure :: transforms
       procedure :: destroy
@@ -154,6 +155,7 @@ contains
 
       self%length = 0.0_sp
       self%released = .false.
+      call self%long_waves%begin()
       if (self%by_waves) then
          self%waves%fixed_load = self%fixed_load
          call self%waves%apply(coarse, self%residual, self%search, self%image, self%blocks%pending, form, &
@@ -168,7 +170,8 @@ contains
 
    !> Release the cells whose trial pressure is negative (module `schur_release`), and extend the residual to them by some
    !> steps. Afterwards `image`, `response` and the coarse part hold the change of the direction. On a long or free grid it
-   !> keeps the load of the long waves (module `schur_long_waves`). Collective.
+   !> keeps the load of the long waves (module `schur_long_waves`). It may be called again with the changed direction.
+   !> Collective.
    subroutine release(self, coarse, active, steps, trial, pressure, direction)
       class(schur_preconditioner_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
@@ -183,15 +186,15 @@ contains
       self%released = .true.
       form = self%form
       call minimise(self, coarse, active, steps, self%sums%square, form)
-      if (keeps_long_waves(self)) call self%long_waves%restore(coarse, active, trial%offset, self%residual, direction, &
-         self%blocks)
+      if (self%keeps_long_waves()) call self%long_waves%restore(coarse, active, .not. self%fixed_load .and. &
+         self%grid%boundary == boundary_periodic, trial%offset, self%residual, direction, self%blocks)
    end subroutine release
 
-   !> Must the load of the long waves be kept?
+   !> Does a release keep the load of the long waves?
    pure logical function keeps_long_waves(self)
       class(schur_preconditioner_type), intent(in) :: self
 
-      keeps_long_waves = self%long_waves%matter .and. self%fixed_load
+      keeps_long_waves = self%long_waves%matter
    end function keeps_long_waves
 
    !> Reduce v.B v by some steps of conjugate gradients on N. Collective.
@@ -219,7 +222,7 @@ contains
          if (product <= solved*first .or. product <= tiny(1.0_dp)) exit
          step%first = k == 1
          ! The long waves of a step need the sums of the last response, too.
-         step%last = k == steps .and. .not. (self%released .and. keeps_long_waves(self))
+         step%last = k == steps .and. .not. (self%released .and. self%keeps_long_waves())
          if (k > 1) step%beta = real(product/before, sp)
          before = product
          call self%blocks%form_direction(coarse, real(step%beta, dp))
@@ -245,7 +248,10 @@ contains
       integer, intent(in) :: jb                          !! row of blocks
       real(sp) :: row(self%grid%nx)
 
-      row = real(self%blocks%pending(coarse%block_x(1:self%grid%nx), jb), sp)
+      associate (block_x => coarse%block_x(1:self%grid%nx))
+         row = real(self%blocks%pending(block_x, jb), sp)
+         if (self%released .and. self%keeps_long_waves()) row = row + real(self%long_waves%restored(block_x, jb), sp)
+      end associate
    end function correction
 
    !> Transforms done so far, in units of a transform of the whole grid.
