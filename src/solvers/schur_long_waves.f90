@@ -1,4 +1,4 @@
-!> Keeps the load of the long waves of a step, on a long grid and on a free one.
+!> Keeps the load of the long waves of a step, on a long grid, a long line contact and a free grid.
 !>
 !> A step consists of the image b = B v on the contact (module `schur_preconditioner`). In the cells outside it b should be
 !> zero. After a few conjugate gradients it is nearly zero there, and what is left of it is not part of the step. The load of
@@ -35,10 +35,12 @@ module schur_long_waves
    public :: long_waves_type, new_long_waves
 
    real(dp), parameter :: least_share = 1e-6_dp   !! least smoothed share of cells in contact by which a load is divided
+   real(dp), parameter :: long_line = 1000.0_dp   !! cells of a line contact from which waves along it need care
+   real(dp), parameter :: line_width = 512.0_dp   !! cells of a line contact that count as its shorter side
 
    !> The correction. A variable of this type must not be copied.
    type :: long_waves_type
-      logical :: matter = .false.                      !! the grid is long, or free
+      logical :: matter = .false.                      !! the grid is long or free, or a long line contact
       real(dp), allocatable :: restored(:, :)          !! part of the step on the contact, (nx, held rows of blocks)
       logical, private :: first = .true.               !! the next call is the first one of a step
       integer, private :: threads = 1
@@ -65,7 +67,8 @@ contains
       type(error_type), allocatable, intent(inout) :: error   !! with an error, nothing is done
 
       if (allocated(error)) return
-      self%matter = min(grid%nx, grid%ny) > 1 .and. (grid%boundary /= boundary_periodic .or. grid%is_long())
+      self%matter = grid%boundary /= boundary_periodic .or. grid%is_long()
+      if (min(grid%nx, grid%ny) == 1) self%matter = grid%cells() >= long_line
       if (.not. self%matter) return
       self%block_size = coarse%cells
       self%threads = threads
@@ -83,13 +86,16 @@ contains
       type(grid_type), intent(in) :: grid
       type(coarse_level_type), intent(in) :: coarse
       real(dp), allocatable :: symbol(:, :)
+      real(dp) :: width
       integer :: i, j, modes(2)
 
+      width = min(grid%lx, grid%ly)
+      if (min(grid%nx, grid%ny) == 1) width = line_width*grid%cell_side()
       modes = self%smoother%modes()
       allocate (symbol(modes(1):modes(2), 0:coarse%ny/2))
       do j = 0, coarse%ny/2
          do i = modes(1), modes(2)
-            symbol(i, j) = 1.0_dp/(1.0_dp + min(grid%lx, grid%ly)*hypot(i/grid%lx, j/grid%ly))
+            symbol(i, j) = 1.0_dp/(1.0_dp + width*hypot(i/grid%lx, j/grid%ly))
          end do
       end do
       call self%smoother%set_symbol(symbol)
