@@ -62,6 +62,8 @@ module coarse_level
       procedure, private :: sum_blocks_single, sum_blocks_double
       procedure :: share_blocks
       procedure :: block_totals
+      procedure :: evenness
+      procedure :: is_even
       procedure :: predict_form
       procedure :: transforms
       procedure :: destroy
@@ -230,6 +232,24 @@ contains
 
       if (self%copied) values(:, :) = gather_rows(values(:, self%all_strips(1):self%all_strips(2)))
    end subroutine share_blocks
+
+   !> The average number of cells of a block over that of each block in a row of blocks.
+   pure function evenness(self, jb)
+      class(coarse_level_type), intent(in) :: self
+      integer, intent(in) :: jb                        !! row of blocks
+      real(dp) :: evenness(self%nx)
+
+      evenness = self%cells/(self%sizes_x*real(self%first_y(jb + 1) - self%first_y(jb), dp))
+   end function evenness
+
+   !> Do all blocks have the same number of cells?
+   pure logical function is_even(self)
+      class(coarse_level_type), intent(in) :: self
+
+      associate (heights => self%first_y(2:) - self%first_y(:self%ny))
+         is_even = all(self%sizes_x == self%sizes_x(1)) .and. all(heights == heights(1))
+      end associate
+   end function is_even
 
    !> Totals over the rows of blocks, added in their order. Collective.
    function block_totals(self, rows) result(totals)

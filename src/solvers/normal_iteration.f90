@@ -236,7 +236,7 @@ contains
             pressure, work%direction(:, :, as_formed))
          call try_pressure(work, alpha, pressure, trial)
          if (k == most_releases .or. .not. work%preconditioner%keeps_long_waves()) exit
-         if (-trial%below <= negligible*trial%above) exit
+         if (trial%cells < 1.0_dp .or. -trial%below <= negligible*trial%above) exit
 
          if (task%control == control_pressure) then
             surplus = trial%above + trial%below - task%target*work%grid%cells()

@@ -85,10 +85,24 @@ contains
       real(dp), intent(in) :: sums(:, coarse%held(1):)       !! over this factor
       real(dp), intent(inout) :: addition(:, coarse%held(1):)
       real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1)
+      real(dp) :: means(coarse%nx, coarse%held(1):coarse%held(2))
       integer :: j
 
-      call self%model%add_missing(factor, sums, addition)
+      if (coarse%is_even()) then
+         call self%model%add_missing(factor, sums, addition)
+      else
+         !$omp parallel do default(none) shared(coarse, sums, means) private(j) num_threads(self%threads)
+         do j = coarse%held(1), coarse%held(2)
+            means(:, j) = sums(:, j)*coarse%evenness(j)
+         end do
+         call self%model%add_missing(factor, means, addition)
+         !$omp parallel do default(none) shared(coarse, addition) private(j) num_threads(self%threads)
+         do j = coarse%held(1), coarse%held(2)
+            addition(:, j) = addition(:, j)*coarse%evenness(j)
+         end do
+      end if
       if (.not. self%mean_stiffness > 0.0_dp) return
+
       do j = coarse%held(1), coarse%held(2)
          rows(1, j) = sum(sums(:, j))
       end do
@@ -200,7 +214,7 @@ contains
       do j = coarse%held(1), coarse%held(2)
          self%pending(:, j) = 0.0_dp
          far_sums(:) = 0.0_dp
-         if (any(self%far(:, j) > 0.0_dp)) call add_far_response(self, j, far_sums)
+         if (any(self%far(:, j) > 0.0_dp)) call add_far_response(self, coarse, j, far_sums)
          rows(1, j) = far_sums(1) + sum(self%search_off(:, j)*self%addition(:, j))
          rows(2, j) = far_sums(2) + sum(self%addition(:, j)*self%image_off(:, j))
          rows(3, j) = far_sums(3) + sum(self%addition(:, j)*(2.0_dp*self%response_off(:, j) &
@@ -214,17 +228,19 @@ contains
 
    !> Add the stencil's response of the far cells of a row of blocks to its sums. Only the part c0 of the stencil acts on a
    !> constant.
-   pure subroutine add_far_response(self, j, sums)
+   pure subroutine add_far_response(self, coarse, j, sums)
       class(schur_blocks_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: j                           !! row of blocks
       real(dp), intent(out) :: sums(3)                   !! d.e, b.e and e^2
-      real(dp) :: response(size(self%far, 1))
+      real(dp) :: response(size(self%far, 1)), c0(size(self%far, 1))
 
-      response(:) = stencil_c0*self%far(:, j)*self%far_search(:, j)
+      c0 = stencil_c0*coarse%evenness(j)
+      response(:) = c0*self%far(:, j)*self%far_search(:, j)
       self%response_off(:, j) = self%response_off(:, j) + response
       sums(1) = sum(response*self%far_search(:, j))
       sums(2) = sum(response*self%far_image(:, j))
-      sums(3) = sum(stencil_c0*response*self%far_search(:, j))
+      sums(3) = sum(c0*response*self%far_search(:, j))
    end subroutine add_far_response
 
    !> Take a step along the direction.
@@ -239,7 +255,7 @@ contains
          self%image_off(:, j) = self%image_off(:, j) + length*(self%response_off(:, j) &
             + self%addition(:, j)*self%cells_off(:, j))
          self%far_image(:, j) = self%far_image(:, j) &
-            + length*(stencil_c0*self%far_search(:, j) + self%addition(:, j))
+            + length*(stencil_c0*coarse%evenness(j)*self%far_search(:, j) + self%addition(:, j))
          self%pending(:, j) = length*self%addition(:, j)
       end do
    end subroutine advance

@@ -36,7 +36,8 @@ module schur_passes
       integer :: rows(2) = 0                             !! first and last row of this process with the margin
       type(row_halo_type) :: rim                         !! rows of other processes that the stencil reads
       integer :: threads = 1
-      real(sp) :: weights(3) = 0.0_sp                    !! of the stencil: centre, along x, along y
+      real(sp) :: weights(2) = 0.0_sp                    !! of the stencil, along x and y
+      real(sp), allocatable :: centre(:, :)              !! in its middle, (columns, numbers of rows of a block)
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       type(image_sums_type) :: sums                      !! of the residual and its image
       ! Over the columns and rows; the residual and the direction have one more on each side:
@@ -154,21 +155,23 @@ contains
 
    !> Compute the image of the residual by K in some rows of a block.
    subroutine image_rows(self, coarse, active, jb, which, rows)
-      class(schur_fields_type), intent(inout) :: self
+      class(schur_fields_type), intent(inout), target :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb                          !! row of blocks
       integer, intent(in) :: which(3)                    !! first and last row, and their distance
       type(image_sums_type), intent(inout) :: rows(self%rows(1):)
       real(sp), allocatable :: column(:), count(:)
+      real(sp), pointer, contiguous :: centre(:)
       integer :: j, k
 
       allocate (column(self%columns(1):self%columns(2)), count(self%columns(1):self%columns(2)), source=0.0_sp)
+      centre(self%columns(1):) => self%centre(:, coarse%first_y(jb + 1) - coarse%first_y(jb))
       do j = which(1), which(2), which(3)
          rows(j) = image_sums_type()
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
-               call image_cells(active%wide_last(k, jb) - first + 1, self%weights, &
+               call image_cells(active%wide_last(k, jb) - first + 1, centre(first:), self%weights, &
                   self%residual(first, j - 1), self%residual(first - 1, j), self%residual(first, j + 1), &
                   self%image(first:, j), column(first), count(first), rows(j))
             end associate
@@ -261,11 +264,12 @@ contains
       logical, intent(in) :: last
       type(response_sums_type), intent(inout) :: rows(self%rows(1):)
       real(sp), allocatable, target :: column(:), below(:), above(:)
-      real(sp), pointer, contiguous :: south(:), north(:)
+      real(sp), pointer, contiguous :: centre(:), south(:), north(:)
       integer :: j, k, n
 
       if (active%wide_runs(jb) == 0) return
       allocate (column(self%columns(1):self%columns(2)), source=0.0_sp)
+      centre(self%columns(1):) => self%centre(:, coarse%first_y(jb + 1) - coarse%first_y(jb))
       do j = which(1), which(2), which(3)
          south(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j - 1], below)
          north(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j + 1], above)
@@ -273,10 +277,10 @@ contains
             associate (first => active%wide_first(k, jb))
                n = active%wide_last(k, jb) - first + 1
                if (last) then
-                  call last_response_cells(n, self%weights, south(first:), self%search(first - 1, j), north(first:), &
-                     self%response(first:, j), rows(j))
+                  call last_response_cells(n, centre(first:), self%weights, south(first:), &
+                     self%search(first - 1, j), north(first:), self%response(first:, j), rows(j))
                else
-                  call response_cells(n, self%weights, south(first:), self%search(first - 1, j), north(first:), &
+                  call response_cells(n, centre(first:), self%weights, south(first:), self%search(first - 1, j), north(first:), &
                      self%image(first:, j), self%response(first:, j), column(first), rows(j))
                end if
             end associate

@@ -108,7 +108,8 @@ contains
       self%compliance = typical*pi*coarse%kernel%compliance(pi/coarse%h)
       wx = merge(0.0_dp, stencil_c1*coarse%h/grid%dx, grid%nx == 1)
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
-      self%weights = real([stencil_c0 + 2.0_dp*(wx + wy), wx, wy], sp)
+      self%weights = real([wx, wy], sp)
+      call set_centre(self, coarse, 2.0_dp*(wx + wy))
       ! They take no memory before `clear` of module `active_blocks` sets them to zero, with the threads that use them.
       allocate (self%residual(self%columns(1) - 1:self%columns(2) + 1, self%rows(1) - 1:self%rows(2) + 1))
       if (.not. self%by_waves) allocate (self%before(grid%nx, grid%rows()))
@@ -126,6 +127,25 @@ contains
       if (.not. self%by_waves) call new_long_waves(self%long_waves, grid, coarse, threads, error)
       if (self%by_waves) call new_wave_preconditioner(self%waves, grid, coarse, error)
    end subroutine new_schur_preconditioner
+
+   !> Set the weights in the middle of the stencil. The coarse level takes the part c0 of the stencil away from long waves.
+   !> If a block has fewer or more cells than others, the weight c0 of the sum over its cells must be the same. With the same
+   !> weight in all cells the longest waves of large grids, whose model is much smaller than c0, would be too stiff.
+   subroutine set_centre(self, coarse, sides)
+      type(schur_preconditioner_type), intent(inout) :: self
+      type(coarse_level_type), intent(in) :: coarse
+      real(dp), intent(in) :: sides                      !! sum of the weights of the cells beside it
+      real(dp) :: c0(coarse%nx)
+      integer :: jb
+
+      associate (heights => coarse%first_y(2:) - coarse%first_y(:coarse%ny))
+         allocate (self%centre(self%columns(1):self%columns(2), minval(heights):maxval(heights)), source=0.0_sp)
+         do jb = 1, coarse%ny
+            c0(:) = stencil_c0*coarse%evenness(jb)
+            self%centre(:, heights(jb)) = real(c0(coarse%block_x) + sides, sp)
+         end do
+      end associate
+   end subroutine set_centre
 
    !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K. The
    !> residual before is kept, except if M r comes from `waves`.

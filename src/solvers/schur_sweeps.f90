@@ -29,25 +29,25 @@ module schur_sweeps
 contains
 
    !> Compute image = K residual, with its sums on N.
-   pure subroutine image_cells(n, weights, south, residual, north, image, column, count, sums)
+   pure subroutine image_cells(n, centre, weights, south, residual, north, image, column, count, sums)
       integer, intent(in) :: n
-      real(sp), intent(in) :: weights(3)            !! of the stencil: centre, along x, along y
+      real(sp), intent(in) :: centre(n)             !! weight of the stencil in its middle
+      real(sp), intent(in) :: weights(2)            !! those along x and y
       real(sp), intent(in) :: south(n), residual(0:n + 1), north(n)
       real(sp), intent(inout) :: image(n)
       real(sp), intent(inout) :: column(n)          !! sums of the image on N over the rows of a block
       real(sp), intent(inout) :: count(n)           !! numbers of cells in N likewise
       type(image_sums_type), intent(inout) :: sums
-      real(sp) :: centre, wx, wy, form, square, b, f, inside
+      real(sp) :: wx, wy, form, square, b, f, inside
       integer :: i
 
-      centre = weights(1)
-      wx = weights(2)
-      wy = weights(3)
+      wx = weights(1)
+      wy = weights(2)
       form = 0.0_sp
       square = 0.0_sp
       !$omp simd reduction(+:form, square) private(b, f, inside)
       do i = 1, n
-         b = centre*residual(i) - wx*(residual(i - 1) + residual(i + 1)) - wy*(south(i) + north(i))
+         b = centre(i)*residual(i) - wx*(residual(i - 1) + residual(i + 1)) - wy*(south(i) + north(i))
          inside = off(residual(i))
          f = inside*b
          image(i) = b
@@ -100,26 +100,25 @@ contains
    end subroutine search_cells
 
    !> Compute response = K search, with the sums on N.
-   pure subroutine response_cells(n, weights, south, search, north, image, response, column, sums)
+   pure subroutine response_cells(n, centre, weights, south, search, north, image, response, column, sums)
       integer, intent(in) :: n
-      real(sp), intent(in) :: weights(3)
+      real(sp), intent(in) :: centre(n), weights(2)
       real(sp), intent(in) :: south(n), search(0:n + 1), north(n)
       real(sp), intent(in) :: image(n)
       real(sp), intent(inout) :: response(n)
       real(sp), intent(inout) :: column(n)          !! sums of the response on N over the rows of a block
       type(response_sums_type), intent(inout) :: sums
-      real(sp) :: centre, wx, wy, form, cross, square, e, f
+      real(sp) :: wx, wy, form, cross, square, e, f
       integer :: i
 
-      centre = weights(1)
-      wx = weights(2)
-      wy = weights(3)
+      wx = weights(1)
+      wy = weights(2)
       form = 0.0_sp
       cross = 0.0_sp
       square = 0.0_sp
       !$omp simd reduction(+:form, cross, square) private(e, f)
       do i = 1, n
-         e = centre*search(i) - wx*(search(i - 1) + search(i + 1)) - wy*(south(i) + north(i))
+         e = centre(i)*search(i) - wx*(search(i - 1) + search(i + 1)) - wy*(south(i) + north(i))
          f = acts(search(i))*e
          response(i) = e
          column(i) = column(i) + f
@@ -133,22 +132,21 @@ contains
    end subroutine response_cells
 
    !> Compute response = K search for the last step, of which only the sum d e is needed.
-   pure subroutine last_response_cells(n, weights, south, search, north, response, sums)
+   pure subroutine last_response_cells(n, centre, weights, south, search, north, response, sums)
       integer, intent(in) :: n
-      real(sp), intent(in) :: weights(3)
+      real(sp), intent(in) :: centre(n), weights(2)
       real(sp), intent(in) :: south(n), search(0:n + 1), north(n)
       real(sp), intent(inout) :: response(n)
       type(response_sums_type), intent(inout) :: sums
-      real(sp) :: centre, wx, wy, form, e
+      real(sp) :: wx, wy, form, e
       integer :: i
 
-      centre = weights(1)
-      wx = weights(2)
-      wy = weights(3)
+      wx = weights(1)
+      wy = weights(2)
       form = 0.0_sp
       !$omp simd reduction(+:form) private(e)
       do i = 1, n
-         e = centre*search(i) - wx*(search(i - 1) + search(i + 1)) - wy*(south(i) + north(i))
+         e = centre(i)*search(i) - wx*(search(i - 1) + search(i + 1)) - wy*(south(i) + north(i))
          response(i) = e
          form = form + search(i)*e
       end do
