@@ -6,6 +6,7 @@ python tools/campaign_contact.py sizes              errors of rough contacts of 
 python tools/campaign_contact.py hertz              errors of single contacts of few cells
 python tools/campaign_contact.py oblong             iterations with cells longer than wide
 python tools/campaign_contact.py long               iterations on grids longer than wide
+python tools/campaign_contact.py strips 150         errors and iterations on strips of any length
 python tools/campaign_contact.py edge               iterations of contacts at the edge of free maps
 python tools/campaign_contact.py pull               errors of the pull-off force of spheres
 """
@@ -259,6 +260,67 @@ def long():
             print(f"{nx} x {ny} cells, {control}: iterations {', '.join(numbers)}")
 
 
+def strip_road(rng):
+    """Draw a periodic road of any length and width, with its sides in cells of any shape."""
+    nx, ny = int(10 ** rng.uniform(1, 4)), int(10 ** rng.uniform(0, 2))
+    qx, qy = np.fft.fftfreq(nx), np.fft.fftfreq(ny)[:, np.newaxis]
+    wave_number = np.hypot(qx, qy)
+    longest, shortest = 10 ** rng.uniform(0.8, math.log10(nx)), rng.uniform(2.5, 12)
+    inside = (wave_number >= 1 / longest) & (wave_number <= 1 / shortest)
+    amplitude = np.where(inside, np.maximum(wave_number, 1e-9) ** -rng.uniform(1.3, 2.0), 0.0)
+    phase = np.exp(2j * np.pi * rng.random((ny, nx)))
+    height = np.fft.ifft2(amplitude * phase).real
+    slope = math.sqrt(np.mean(np.diff(height, axis=1) ** 2))
+    if slope == 0.0:
+        return strip_road(rng)
+    height *= 0.1 / slope
+    dx, dy = 10 ** rng.uniform(-0.5, 0.5, 2)
+    if ny > 1 and rng.random() < 0.5:
+        return np.ascontiguousarray(height.T), ny * dx, nx * dy
+    return height, nx * dx, ny * dy if ny > 1 else None
+
+
+def faults_of_contact(found, height, lx, ly):
+    """Return the duality gap and the distance of the loaded cells from their mean level.
+
+    Both are divided by the rms height. The gap is computed by the Fourier transform of numpy.
+    """
+    ny, nx = height.shape
+    qx = 2 * np.pi * np.fft.fftfreq(nx, lx / nx)
+    qy = 2 * np.pi * np.fft.fftfreq(ny, (ly or 1.0) / ny)[:, np.newaxis]
+    wave_number = np.hypot(qx, qy)
+    compliance = 2 / np.where(wave_number > 0, wave_number, np.inf)
+    pressure = found.pressure.reshape(height.shape)
+    gap = np.fft.ifft2(compliance * np.fft.fft2(pressure)).real - height
+    level = np.sum(pressure * gap) / np.sum(pressure)
+    distance = np.sum(pressure * np.abs(gap - level)) / np.sum(pressure)
+    return (level - gap.min()) / height.std(), distance / height.std()
+
+
+def strips(rng, count):
+    """Solve contacts of strips under a load and at its approach; print errors and iterations."""
+    iterations, gaps, distances, missing = [], [], [], 0
+    for _ in range(count):
+        height, lx, ly = strip_road(rng)
+        control = {"pressure": 0.1 * 10 ** rng.uniform(-3, 0.2)}
+        for _ in range(2):
+            try:
+                found = asperity.solve_normal(height, lx, ly, 1.0, **control)
+            except asperity.NotConverged:
+                missing += 1
+                break
+            except ValueError:
+                break                     # full contact, which no approach determines
+            iterations.append(found.iterations)
+            gap, distance = faults_of_contact(found, height, lx, ly)
+            gaps.append(gap)
+            distances.append(distance)
+            control = {"displacement": found.displacement}
+    print(f"{len(iterations)} contacts, {missing} not converged; iterations: median "
+          f"{np.median(iterations):g}, most {max(iterations)}; largest duality gap "
+          f"{max(gaps):.1e} and distance of loaded cells {max(distances):.1e} of the rms height")
+
+
 def edge():
     """Print iterations and transforms of rough contacts that reach the edge of a free map."""
     for n, boundary in itertools.product((128, 256, 512, 1024), ("free", "periodic")):
@@ -278,7 +340,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong",
-                                         "long", "edge"])
+                                         "long", "strips", "edge"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -294,6 +356,8 @@ def main():
         oblong()
     elif given.what == "long":
         long()
+    elif given.what == "strips":
+        strips(rng, given.count)
     elif given.what == "edge":
         edge()
     elif given.what == "normal":

@@ -136,6 +136,35 @@ def test_long_grid_of_oblong_cells(seed):
     assert gap.min() >= -2e-6 * height.std()
 
 
+@pytest.mark.filterwarnings("ignore:patches of contact")
+@pytest.mark.parametrize(("nx", "ny", "lx", "ly"), [
+    (82, 2397, 37.8, 4666.0),           # oblong cells, blocks of 16 x 3 or 4 of them
+    (4001, 53, 4001.0, 53.0), (7, 3001, 7.0, 3001.0), (2311, 6, 5332.0, 1.9),
+    (5003, 1, 5003.0, None)])
+def test_strips_of_any_length(nx, ny, lx, ly):
+    rng = np.random.default_rng(nx)
+    waves = np.hypot(np.fft.fftfreq(nx), np.fft.fftfreq(ny)[:, np.newaxis])
+    spectrum = np.where((waves >= 0.01) & (waves <= 0.12), np.maximum(waves, 0.01) ** -1.6, 0.0)
+    height = np.fft.ifft2(spectrum * np.exp(2j * np.pi * rng.random((ny, nx)))).real
+    height *= 0.1 / np.std(np.diff(height, axis=int(nx > ny)))
+    modulus = 2 * np.pi * np.hypot(np.fft.fftfreq(nx, lx / nx),
+                                   np.fft.fftfreq(ny, (ly or 1.0) / ny)[:, np.newaxis]) / 2
+    modulus[0, 0] = np.inf
+    control = {"pressure": 0.003}
+    for _ in range(2):
+        contact = asperity.solve_normal(height, lx, ly, 1.0, **control)
+        pressure = contact.pressure.reshape(height.shape)
+        displacement = np.fft.ifft2(np.fft.fft2(pressure) / modulus).real
+        gap = displacement - height
+        level = np.average(gap, weights=pressure)
+        assert pressure.min() >= 0
+        assert level - gap.min() <= 1.1e-6 * height.std()
+        assert np.average(np.abs(gap - level), weights=pressure) <= 1.1e-6 * height.std()
+        assert pressure.mean() == pytest.approx(0.003, rel=1e-4)
+        assert contact.iterations <= 25
+        control = {"displacement": contact.displacement}
+
+
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 @pytest.mark.parametrize("method", ["fast", "thesis"])
 @pytest.mark.parametrize("displacement", [0.0, -1e-5])

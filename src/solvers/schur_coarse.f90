@@ -7,6 +7,10 @@
 !> longest waves, about that of the short ones. With c0 = 0.7 the sum of both fits |q| within a factor of 1.8. (With
 !> c0 = 1 the factor is larger, but this is better if the residual is not extended.)
 !>
+!> The blocks of a grid may differ in their numbers of cells (`evenness` of module `coarse_level`). The part c0 of the stencil
+!> is then weighted such that its sum over each block is the same, and the missing part is a convolution of block means, not
+!> sums. Both cancel for a uniform field, as they must for long waves.
+!>
 !> The same grid holds the coarse part of W, an approximate inverse of the model on the cells N outside the
 !> contact:
 !>     w IFFT( symbol FFT( w R p ) ),   w = (share of N in the block)^0.3,   symbol = 1/(B + shift) - om.
