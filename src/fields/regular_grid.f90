@@ -21,7 +21,7 @@ module regular_grid
    real(dp), parameter, public :: large_grid = 1e7_dp     !! cells from which a normal contact starts from two coarser grids
 
    real(dp), parameter :: long = 4.0_dp              !! least ratio of the sides of a long grid
-   real(dp), parameter :: largest_aspect = 16.0_dp   !! largest ratio of a cell's sides for which a stencil is accurate
+   real(dp), parameter :: largest_aspect = 100.0_dp   !! largest ratio of a cell's sides for which a stencil is accurate
 
    !> Cell (i, j), from 0, has its centre at x = i dx, y = j dy.
    type :: grid_type

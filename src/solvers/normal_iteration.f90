@@ -130,7 +130,7 @@ contains
       fixed_load = task%control == control_pressure
       now%free_mean = .not. fixed_load .and. work%grid%boundary == boundary_periodic
       stiffness = 0.0_dp
-      if (now%free_mean) stiffness = mean_stiffness(work%grid%cells(), 1.0_dp - measure%contact)
+      if (now%free_mean) stiffness = mean_stiffness(work%grid, 1.0_dp - measure%contact)
       call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
       work%preconditioner%fixed_load = fixed_load

@@ -11,7 +11,7 @@ module normal_passes
    use field_sums, only : row_total
    use normal_sums, only : direction_sums_type, state_sums_type, total
    use normal_sweeps, only : direction_cells, load_cells, measure_cells, overlap_cells, spread_cells, trial_type
-   use asperity_precision, only : dp, sp
+   use asperity_precision, only : dp, pi, sp
    use regular_grid, only : grid_type
    use schur_preconditioner, only : new_schur_preconditioner, schur_preconditioner_type
    implicit none
@@ -22,8 +22,8 @@ module normal_passes
 
    integer, parameter, public :: as_formed = 1, lowered = 2   !! directions of `normal_work_type`
 
-   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open. It is about twice the
-   !> inverse compliance of an open cell that is surrounded by cells in contact.
+   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open and square. It is about
+   !> twice the inverse compliance of an open cell that is surrounded by cells in contact.
    real(dp), parameter :: of_open_cells = 2.0_dp
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
@@ -177,12 +177,22 @@ contains
    !> inverse compliance of this change is therefore sufficient. With n cells it is
    !>     n/(1_S.A 1_S),     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell),
    !> where the second form holds for open cells that are far from each other.
-   pure real(dp) function mean_stiffness(cells, open_part)
-      real(dp), intent(in) :: cells                          !! of the grid
+   pure real(dp) function mean_stiffness(grid, open_part)
+      type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: open_part                      !! of the cells
 
-      mean_stiffness = of_open_cells/max(open_part, 1.0_dp/cells)
+      mean_stiffness = of_open_cells/max(open_part, 1.0_dp/grid%cells())
+      if (min(grid%nx, grid%ny) > 1) &
+         mean_stiffness = mean_stiffness*compliance_of_cell(1.0_dp)/compliance_of_cell(grid%dx/grid%dy)
    end function mean_stiffness
+
+   !> Compliance of a rectangular cell: the mean of 1/|q| over the wave vectors of the grid, over the side of a square cell of
+   !> the same area.
+   pure real(dp) function compliance_of_cell(ratio)
+      real(dp), intent(in) :: ratio                          !! of the sides
+
+      compliance_of_cell = (sqrt(ratio)*asinh(1.0_dp/ratio) + asinh(ratio)/sqrt(ratio))/pi
+   end function compliance_of_cell
 
    !> Compute the direction in a row.
    subroutine direction_row(self, preconditioned, beta, j, pressure, correction, sums)
