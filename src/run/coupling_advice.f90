@@ -3,7 +3,7 @@ module coupling_advice
    use contact_model, only : contact_type
    use field_sums, only : row_totals
    use asperity_precision, only : dp
-   use text_tools, only : to_text
+   use text_tools, only : rounded_text
    implicit none
    private
 
@@ -46,7 +46,7 @@ contains
       advice = ''
       jammed = jammed_part(self)
       if (jammed <= much) return
-      advice = to_text(100.0_dp*jammed)//' % of the normal force is on slopes above 1/coefficient, where '
+      advice = rounded_text(100.0_dp*jammed, 2)//' % of the normal force is on slopes above 1/coefficient, where '
       if (self%tangential%law%strength_beside() < 0.0_dp) then
          advice = advice//'friction can resist any uphill force, so that there may be no solution'
       else

@@ -225,5 +225,5 @@ def check_depth(displacement: float, array: NDArray[np.float64]) -> None:
     deepest = max(float(array.max()) - float(array.mean()), 0.0)
     if displacement >= deepest:
         raise ValueError(
-            f"displacement = {displacement}: must be below {deepest:g} m, the mean gap at first"
-            " touch: beyond it the pressure of a periodic contact is not determined")
+            f"displacement = {displacement}: must be below {deepest:.10g} m, the mean gap at"
+            " first touch: beyond it the pressure of a periodic contact is not determined")
