@@ -238,6 +238,7 @@ contains
          if (k == most_releases .or. .not. work%preconditioner%keeps_long_waves()) exit
          if (trial%cells < 1.0_dp .or. -trial%below <= negligible*trial%above) exit
 
+         ! The next release starts from a trial pressure that has the given load with its negative parts.
          if (task%control == control_pressure) then
             surplus = trial%above + trial%below - task%target*work%grid%cells()
             work%offset = work%offset + surplus/(alpha*trial%cells)
