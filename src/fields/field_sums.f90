@@ -16,7 +16,7 @@ module field_sums
    implicit none
    private
 
-   public :: added, cell_count, field_count, field_count_above, field_magnitude, field_maximum, field_mean, field_minimum, &
+   public :: added, cell_count, field_count, field_magnitude, field_maximum, field_mean, field_minimum, &
       field_product, field_rms, field_sum, largest_of_rows, least_of_rows, ratio_of_lengths, row_form, row_product, &
       row_total, row_totals, sum_rows, threads_for, vector_sum
 
@@ -324,23 +324,5 @@ contains
       end do
       cells = row_total(rows)
    end function field_count
-
-   !> Number of cells of the whole grid in which a field is above a limit, as a real number. It needs no field of its own, as
-   !> the condition of `field_count` would.
-   function field_count_above(field, limit) result(cells)
-      real(dp), intent(in) :: field(:, :)      !! [nx, rows of this process]
-      real(dp), intent(in) :: limit
-      real(dp) :: cells
-      real(dp), allocatable :: rows(:)
-      integer :: j
-
-      allocate (rows(size(field, 2)))
-      !$omp parallel do default(none) shared(field, limit, rows) private(j) &
-      !$omp num_threads(merge(1, thread_count(), size(field) < least_parallel_cells))
-      do j = 1, size(field, 2)
-         rows(j) = count(field(:, j) > limit)
-      end do
-      cells = row_total(rows)
-   end function field_count_above
 
 end module field_sums

@@ -63,7 +63,6 @@ module coarse_level
       procedure :: share_blocks
       procedure :: block_totals
       procedure :: evenness
-      procedure :: is_even
       procedure :: predict_form
       procedure :: transforms
       procedure :: destroy
@@ -241,15 +240,6 @@ contains
 
       evenness = self%cells/(self%sizes_x*real(self%first_y(jb + 1) - self%first_y(jb), dp))
    end function evenness
-
-   !> Do all blocks have the same number of cells?
-   pure logical function is_even(self)
-      class(coarse_level_type), intent(in) :: self
-
-      associate (heights => self%first_y(2:) - self%first_y(:self%ny))
-         is_even = all(self%sizes_x == self%sizes_x(1)) .and. all(heights == heights(1))
-      end associate
-   end function is_even
 
    !> Totals over the rows of blocks, added in their order. Collective.
    function block_totals(self, rows) result(totals)

@@ -44,7 +44,7 @@ module normal_cg
    use coarse_fields, only : coarse_grid, coarsen, refine_pressure
    use contact_solver, only : check_normal_kernel, contact_solver_type
    use asperity_errors, only : error_type
-   use field_sums, only : field_count_above, field_mean, field_rms
+   use field_sums, only : field_count, field_mean, field_rms
    use finite_fields, only : reject_overflow
    use fft_conv, only : convolution_type, new_convolution
    use gap_watch, only : gap_watch_type, new_gap_watch
@@ -283,7 +283,7 @@ contains
       if (.not. useful) return
       task%warm = .true.
 
-      if (self%grid%cells() >= self%between_from .and. field_count_above(rough, 0.0_dp) > sparse*coarse%cells()) then
+      if (self%grid%cells() >= self%between_from .and. field_count(rough > 0.0_dp) > sparse*coarse%cells()) then
          between = coarse_grid(self%grid, ratio=2)
          allocate (better(between%nx, between%rows()))
          call refine_pressure(coarse, between, rough, self%operator%threads, better)
@@ -329,8 +329,7 @@ contains
       allocate (road, mold=pressure)
       call coarsen(self%grid, coarse, height, self%operator%threads, road)
       if (field_rms(road, field_mean(road)) < least_roughness*task%rms_height) return
-      if (task%control == control_approach .and. field_count_above(road, task%datum - task%target) < few_overlap) &
-         return
+      if (task%control == control_approach .and. field_count(road + (task%target - task%datum) > 0.0_dp) < few_overlap) return
       if (present(past)) then
          allocate (memory, mold=road)
          call coarsen(self%grid, coarse, past, self%operator%threads, memory)
@@ -349,8 +348,7 @@ contains
       call solver%destroy()
       effort = effort + outcome%ffts*coarse%cells()/self%grid%cells()
       useful = outcome%converged
-      if (coarse%boundary == boundary_periodic) &
-         useful = useful .and. field_count_above(pressure, 0.0_dp) < nearly_full*coarse%cells()
+      if (coarse%boundary == boundary_periodic) useful = useful .and. field_count(pressure > 0.0_dp) < nearly_full*coarse%cells()
    end subroutine solve_roughly
 
    !> Transforms done so far. Those of the coarse level count by their number of cells.

@@ -11,8 +11,8 @@
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
 !> There are directions of another kind: plain ones, those of very oblong cells, and all later ones of a solve in which
-!> several trials with released cells in a row did not lower the energy: the model then misleads, as on long grids of oblong
-!> cells. No cells are released for them, and alpha comes from a prediction of d.A d on the block means, which the ratio
+!> several trials with released cells in a row did not lower the energy: the model then misleads, as on strips thousands of
+!> times as long as wide. No cells are released for them, and alpha comes from a prediction of d.A d on the block means, which the ratio
 !> kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
@@ -235,7 +235,7 @@ contains
          call work%preconditioner%release(work%coarse, work%active, steps_after(class), trial_type(alpha, work%offset), &
             pressure, work%direction(:, :, as_formed))
          call try_pressure(work, alpha, pressure, trial)
-         if (k == most_releases .or. .not. work%preconditioner%keeps_long_waves()) exit
+         if (k == most_releases .or. .not. work%preconditioner%long_waves%matter) exit
          if (trial%cells < 1.0_dp .or. -trial%below <= negligible*trial%above) exit
 
          ! The next release starts from a trial pressure that has the given load with its negative parts.

@@ -28,6 +28,7 @@ module schur_blocks
       real(dp), allocatable :: pending(:, :)      !! coarse part to be added to b, (nx, held rows of blocks)
       real(dp), allocatable :: correction(:, :)   !! coarse part of W applied to -b
       real(dp), allocatable, private :: addition(:, :)   !! coarse part of B d
+      real(dp), allocatable, private :: evenness(:, :)   !! average number of cells of a block over that of each block
       ! Sums over the cells of N in each block:
       real(dp), allocatable :: cells_off(:, :)      !! 1
       real(dp), allocatable :: image_off(:, :)      !! b
@@ -56,6 +57,7 @@ contains
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: threads
       type(error_type), allocatable, intent(out) :: error
+      integer :: j
 
       self%threads = merge(1, threads, real(coarse%nx, dp)*coarse%ny < least_parallel_cells)
       self%cells = coarse%outer%cells()
@@ -64,8 +66,12 @@ contains
          allocate (self%addition(nx, first:last), self%cells_off(nx, first:last), source=0.0_dp)
          allocate (self%image_off(nx, first:last), self%response_off(nx, first:last), source=0.0_dp)
          allocate (self%search_off(nx, first:last), source=0.0_dp)
+         allocate (self%evenness(nx, first:last))
          allocate (self%far(nx, first:last), self%far_image(nx, first:last), self%far_search(nx, first:last), source=0.0_dp)
       end associate
+      do j = coarse%held(1), coarse%held(2)
+         self%evenness(:, j) = coarse%evenness(j)
+      end do
       call new_schur_coarse(self%model, coarse%outer, coarse%h, coarse%nx, coarse%sharing, threads, error)
    end subroutine new_schur_blocks
 
@@ -85,24 +91,10 @@ contains
       real(dp), intent(in) :: sums(:, coarse%held(1):)       !! over this factor
       real(dp), intent(inout) :: addition(:, coarse%held(1):)
       real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1)
-      real(dp) :: means(coarse%nx, coarse%held(1):coarse%held(2))
       integer :: j
 
-      if (coarse%is_even()) then
-         call self%model%add_missing(factor, sums, addition)
-      else
-         !$omp parallel do default(none) shared(coarse, sums, means) private(j) num_threads(self%threads)
-         do j = coarse%held(1), coarse%held(2)
-            means(:, j) = sums(:, j)*coarse%evenness(j)
-         end do
-         call self%model%add_missing(factor, means, addition)
-         !$omp parallel do default(none) shared(coarse, addition) private(j) num_threads(self%threads)
-         do j = coarse%held(1), coarse%held(2)
-            addition(:, j) = addition(:, j)*coarse%evenness(j)
-         end do
-      end if
+      call self%model%add_missing(factor, self%evenness, sums, addition)
       if (.not. self%mean_stiffness > 0.0_dp) return
-
       do j = coarse%held(1), coarse%held(2)
          rows(1, j) = sum(sums(:, j))
       end do
@@ -214,7 +206,7 @@ contains
       do j = coarse%held(1), coarse%held(2)
          self%pending(:, j) = 0.0_dp
          far_sums(:) = 0.0_dp
-         if (any(self%far(:, j) > 0.0_dp)) call add_far_response(self, coarse, j, far_sums)
+         if (any(self%far(:, j) > 0.0_dp)) call add_far_response(self, j, far_sums)
          rows(1, j) = far_sums(1) + sum(self%search_off(:, j)*self%addition(:, j))
          rows(2, j) = far_sums(2) + sum(self%addition(:, j)*self%image_off(:, j))
          rows(3, j) = far_sums(3) + sum(self%addition(:, j)*(2.0_dp*self%response_off(:, j) &
@@ -228,14 +220,13 @@ contains
 
    !> Add the stencil's response of the far cells of a row of blocks to its sums. Only the part c0 of the stencil acts on a
    !> constant.
-   pure subroutine add_far_response(self, coarse, j, sums)
+   pure subroutine add_far_response(self, j, sums)
       class(schur_blocks_type), intent(inout) :: self
-      type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: j                           !! row of blocks
       real(dp), intent(out) :: sums(3)                   !! d.e, b.e and e^2
       real(dp) :: response(size(self%far, 1)), c0(size(self%far, 1))
 
-      c0 = stencil_c0*coarse%evenness(j)
+      c0(:) = stencil_c0*self%evenness(:, j)
       response(:) = c0*self%far(:, j)*self%far_search(:, j)
       self%response_off(:, j) = self%response_off(:, j) + response
       sums(1) = sum(response*self%far_search(:, j))
@@ -255,7 +246,7 @@ contains
          self%image_off(:, j) = self%image_off(:, j) + length*(self%response_off(:, j) &
             + self%addition(:, j)*self%cells_off(:, j))
          self%far_image(:, j) = self%far_image(:, j) &
-            + length*(stencil_c0*coarse%evenness(j)*self%far_search(:, j) + self%addition(:, j))
+            + length*(stencil_c0*self%evenness(:, j)*self%far_search(:, j) + self%addition(:, j))
          self%pending(:, j) = length*self%addition(:, j)
       end do
    end subroutine advance

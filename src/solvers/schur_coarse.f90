@@ -147,21 +147,23 @@ contains
 
    !> Compute the addition of the coarse level to the stencil's product from the sums of a field over the blocks.
    !> Collective.
-   subroutine add_missing(self, factor, sums, addition)
+   subroutine add_missing(self, factor, evenness, sums, addition)
       class(schur_coarse_type), intent(inout) :: self
       real(dp), intent(in) :: factor
+      real(dp), intent(in) :: evenness(:, :)           !! average number of cells of a block over that of each block
       real(dp), intent(in) :: sums(:, :)               !! over this factor
       real(dp), intent(inout) :: addition(:, :)        !! the same for all cells of a block
       integer :: j
 
-      !$omp parallel do default(none) shared(self, factor, sums) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, factor, evenness, sums) private(j) num_threads(self%threads)
       do j = 1, size(sums, 2)
-         call self%missing%forward_row(1, j, factor*sums(:, j)/self%cells)
+         call self%missing%forward_row(1, j, factor*sums(:, j)/self%cells*evenness(:, j))
       end do
       call self%missing%columns(columns_apply)
-      !$omp parallel do default(none) shared(self, addition) private(j) num_threads(self%threads)
+      !$omp parallel do default(none) shared(self, evenness, addition) private(j) num_threads(self%threads)
       do j = 1, size(addition, 2)
          call self%missing%backward_row(1, j, addition(:, j))
+         addition(:, j) = addition(:, j)*evenness(:, j)
       end do
    end subroutine add_missing
 

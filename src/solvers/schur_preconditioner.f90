@@ -72,12 +72,11 @@ module schur_preconditioner
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
       real(sp), pointer, contiguous, private :: own_memory(:, :, :) => null()   !! of the image and the response, if not lent
       type(wave_preconditioner_type) :: waves
-      type(long_waves_type), private :: long_waves
+      type(long_waves_type) :: long_waves                !! of a long or free grid, of which a release keeps the load
    contains
       procedure :: set_residual
       procedure :: extend
       procedure :: release
-      procedure :: keeps_long_waves
       procedure :: correction
       procedure :: transforms
       procedure :: destroy
@@ -206,16 +205,9 @@ contains
       self%released = .true.
       form = self%form
       call minimise(self, coarse, active, steps, self%sums%square, form)
-      if (self%keeps_long_waves()) call self%long_waves%restore(coarse, active, .not. self%fixed_load .and. &
+      if (self%long_waves%matter) call self%long_waves%restore(coarse, active, .not. self%fixed_load .and. &
          self%grid%boundary == boundary_periodic, trial%offset, self%residual, direction, self%blocks)
    end subroutine release
-
-   !> Does a release keep the load of the long waves?
-   pure logical function keeps_long_waves(self)
-      class(schur_preconditioner_type), intent(in) :: self
-
-      keeps_long_waves = self%long_waves%matter
-   end function keeps_long_waves
 
    !> Reduce v.B v by some steps of conjugate gradients on N. Collective.
    subroutine minimise(self, coarse, active, steps, square_before, form)
@@ -242,7 +234,7 @@ contains
          if (product <= solved*first .or. product <= tiny(1.0_dp)) exit
          step%first = k == 1
          ! The long waves of a step need the sums of the last response, too.
-         step%last = k == steps .and. .not. (self%released .and. self%keeps_long_waves())
+         step%last = k == steps .and. .not. (self%released .and. self%long_waves%matter)
          if (k > 1) step%beta = real(product/before, sp)
          before = product
          call self%blocks%form_direction(coarse, real(step%beta, dp))
@@ -270,7 +262,7 @@ contains
 
       associate (block_x => coarse%block_x(1:self%grid%nx))
          row = real(self%blocks%pending(block_x, jb), sp)
-         if (self%released .and. self%keeps_long_waves()) row = row + real(self%long_waves%restored(block_x, jb), sp)
+         if (self%released .and. self%long_waves%matter) row = row + real(self%long_waves%restored(block_x, jb), sp)
       end associate
    end function correction
 
