@@ -62,6 +62,7 @@ module coarse_level
       procedure, private :: sum_blocks_single, sum_blocks_double
       procedure :: share_blocks
       procedure :: block_totals
+      procedure :: block_sum
       procedure :: evenness
       procedure :: predict_form
       procedure :: transforms
@@ -254,20 +255,29 @@ contains
       end if
    end function block_totals
 
+   !> Sum of one number per block over all blocks. Collective.
+   function block_sum(self, numbers) result(total)
+      class(coarse_level_type), intent(in) :: self
+      real(dp), intent(in) :: numbers(:, :)            !! [nx, held rows]
+      real(dp) :: total
+      real(dp) :: rows(1, size(numbers, 2)), totals(1)
+      integer :: j
+
+      do j = 1, size(numbers, 2)
+         rows(1, j) = sum(numbers(:, j))
+      end do
+      totals = self%block_totals(rows)
+      total = totals(1)
+   end function block_sum
+
    !> Estimate of d.A d over the cells, G = 1, from the block means of d. Collective.
    function predict_form(self, squares) result(form)
       class(coarse_level_type), intent(inout) :: self
       real(dp), intent(in) :: squares                  !! d.d over the cells
       real(dp) :: form
-      real(dp) :: rows(1, self%held(1):self%held(2)), total(1)
-      integer :: j
 
       call self%normal%quadratic_form(self%mean, form)
-      do j = self%held(1), self%held(2)
-         rows(1, j) = sum(self%mean(:, j)**2)
-      end do
-      total = self%block_totals(rows)
-      form = self%cells*form + max(squares - self%cells*total(1), 0.0_dp)*self%fine_symbol
+      form = self%cells*form + max(squares - self%cells*self%block_sum(self%mean**2), 0.0_dp)*self%fine_symbol
    end function predict_form
 
    !> Transforms done so far on this level, in units of a transform of the whole grid.

@@ -176,7 +176,8 @@ contains
    !> cells in contact changes by the same amount, only the gaps of the open cells N change. A finite stiffness of about the
    !> inverse compliance of this change is therefore sufficient. With n cells it is
    !>     n/(1_S.A 1_S),     1_S.A 1_S = 1_N.A 1_N ~ (number of open cells) (compliance of an open cell),
-   !> where the second form holds for open cells that are far from each other.
+   !> where the second form holds for open cells that are far from each other. A long cell is less compliant than a square one
+   !> of the same area.
    pure real(dp) function mean_stiffness(grid, open_part)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: open_part                      !! of the cells

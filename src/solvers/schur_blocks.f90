@@ -90,16 +90,9 @@ contains
       real(dp), intent(in) :: factor
       real(dp), intent(in) :: sums(:, coarse%held(1):)       !! over this factor
       real(dp), intent(inout) :: addition(:, coarse%held(1):)
-      real(dp) :: rows(1, coarse%held(1):coarse%held(2)), total(1)
-      integer :: j
 
       call self%model%add_missing(factor, self%evenness, sums, addition)
-      if (.not. self%mean_stiffness > 0.0_dp) return
-      do j = coarse%held(1), coarse%held(2)
-         rows(1, j) = sum(sums(:, j))
-      end do
-      total = coarse%block_totals(rows)
-      addition(:, :) = addition + self%mean_stiffness*factor*total(1)/self%cells
+      if (self%mean_stiffness > 0.0_dp) addition(:, :) = addition + self%mean_stiffness*factor*coarse%block_sum(sums)/self%cells
    end subroutine add_coarse
 
    !> Compute the coarse part of the image of the residual, and its contribution to the sums. Collective.

@@ -129,29 +129,13 @@ contains
       end if
       self%given(:, :) = blocks%image_off
       self%first = .false.
-      if (free_mean) missing(:, :) = missing - self%inside*(sum_of_blocks(coarse, missing) &
-         /max(sum_of_blocks(coarse, self%inside), 1.0_dp))
+      if (free_mean) missing(:, :) = missing - self%inside*(coarse%block_sum(missing)/max(coarse%block_sum(self%inside), 1.0_dp))
 
       call self%smoother%apply(self%inside, nearby)
       missing(:, :) = missing/max(nearby, least_share*coarse%cells)
       call self%smoother%apply(missing, self%restored)
       where (.not. self%inside > 0.0_dp) self%restored = 0.0_dp
    end subroutine restore
-
-   !> The sum of numbers per block over the grid. Collective.
-   function sum_of_blocks(coarse, numbers) result(total)
-      type(coarse_level_type), intent(in) :: coarse
-      real(dp), intent(in) :: numbers(:, :)
-      real(dp) :: total
-      real(dp) :: rows(1, size(numbers, 2)), totals(1)
-      integer :: j
-
-      do j = 1, size(numbers, 2)
-         rows(1, j) = sum(numbers(:, j))
-      end do
-      totals = coarse%block_totals(rows)
-      total = totals(1)
-   end function sum_of_blocks
 
    !> Count the cells of each block in contact, and those in which the direction acts.
    subroutine count_cells(self, coarse, active, residual, direction)
