@@ -12,8 +12,8 @@
 !>
 !> There are directions of another kind: plain ones, those of very oblong cells, and all later ones of a solve in which
 !> several trials with released cells in a row did not lower the energy: the model then misleads, as on strips thousands of
-!> times as long as wide. No cells are released for them, and alpha comes from a prediction of d.A d on the block means, which the ratio
-!> kappa of the last true product to its prediction corrects.
+!> times as long as wide. No cells are released for them, and alpha comes from a prediction of d.A d on the block means,
+!> which the ratio kappa of the last true product to its prediction corrects.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
