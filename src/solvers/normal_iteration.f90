@@ -6,14 +6,18 @@
 !> admissible pressures, which gives the clipped step s. The multiple of s that minimises the energy follows from the
 !> product A s.
 !>
+!> The preconditioner M extends the residual by a few steps of conjugate gradients, whose number follows from the size of
+!> the contact. Iterations that reduce the residual slowly add to it.
+!>
 !> The eigenvalues of M A lie within a factor of two, whatever the contact and the grid, so that one value of alpha fits
 !> all iterations. A value learned from the steps before was worse, because the contact changes in these steps. Only after
 !> a step that did not lower the energy is alpha smaller, by the factor kappa.
 !>
-!> There are directions of another kind: plain ones, those of very oblong cells, and all later ones of a solve in which
+!> There are directions of another kind: plain ones, those of very oblong cells, and the next ones of a solve in which
 !> several trials with released cells in a row did not lower the energy: the model then misleads, as on strips thousands of
 !> times as long as wide. No cells are released for them, and alpha comes from a prediction of d.A d on the block means,
-!> which the ratio kappa of the last true product to its prediction corrects.
+!> which the ratio kappa of the last true product to its prediction corrects. Each such pause is twice as long as the one
+!> before it.
 !>
 !> The phase of the loop determines how the next direction is formed:
 !>
@@ -47,7 +51,7 @@ module normal_iteration
    ! trial shorter.
    real(dp), parameter :: shortening = 4.0_dp
    real(dp), parameter :: often_shortened = 1e3_dp   !! kappa from which the direction is the plain residual
-   real(dp), parameter :: misled = 50.0_dp           !! kappa from which no more cells are released in this solve
+   real(dp), parameter :: misled = 50.0_dp           !! kappa from which no cells are released for some iterations
    real(dp), parameter :: hopeless = 1e9_dp    !! kappa from which no step is expected to reduce the energy
    real(dp), parameter :: useless = 0.1_dp     !! largest part of a clipped step that counts as little
    real(dp), parameter :: nothing = 1e-3_dp    !! largest part that counts as nothing
@@ -61,8 +65,11 @@ module normal_iteration
    integer, parameter :: steps_before(0:6) = [1, 1, 1, 2, 3, 4, 5]
    integer, parameter :: steps_after(0:6) = [1, 2, 3, 3, 4, 5, 6]
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
-   real(dp), parameter :: oblong = 2.0_dp         !! aspect of an oblong cell
-   integer, parameter :: least_class = 2          !! of oblong cells and line contacts
+   ! Contacts of noise, long strips and oblong cells need more steps than rough roads. They show it: an iteration after which
+   ! r.M r is more than this part of that before lets all later ones take more steps.
+   real(dp), parameter :: slow = 0.2_dp
+   integer, parameter :: added = 2                !! steps after each slow iteration
+   integer, parameter :: most_added = 10
    ! On a long or free grid the cells whose trial pressure is negative after a release are released, too.
    integer, parameter :: most_releases = 3
    real(dp), parameter :: negligible = 1e-5_dp   !! negative part of a trial pressure that is only clipped
@@ -78,10 +85,12 @@ module normal_iteration
    type :: iteration_type
       integer :: phase = phase_restart      !! how the next direction is formed
       logical :: preconditioned = .false.   !! the present direction is not a plain one
-      logical :: may_release = .true.       !! steps with released cells have not failed too often
+      integer :: pause = 0                  !! iterations that still release no cells, because such steps have failed
+      integer :: next_pause = 6             !! the number of them after the next failure
       logical :: releases = .false.         !! the cells with a negative trial pressure are released
       logical :: free_mean = .false.        !! the load is not given, and a uniform pressure strains nothing
       integer :: class = 0                  !! place in the lists of steps
+      integer :: more = 0                   !! steps beyond those of the lists
       real(dp) :: kappa = 1.0_dp            !! by which trials are shorter than the model says
       real(dp) :: rz = 0.0_dp               !! r.M r of the last direction
       real(dp) :: slope = 0.0_dp            !! r.d
@@ -101,19 +110,13 @@ contains
    end subroutine end_loop
 
    !> The place of a contact in the lists of steps. If the contact is less than half of the grid, the grid counts as one
-   !> with fewer cells, and a grid that is longer than wide as one with more. The stencil fits oblong cells less well: they
-   !> need more steps.
+   !> with fewer cells.
    pure integer function size_class(grid, contact)
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: contact                  !! fraction of the cells
-      real(dp) :: longer
 
-      longer = max(grid%lx, grid%ly)/grid%cell_side()
-      if (min(grid%nx, grid%ny) == 1) longer = max(grid%nx, grid%ny)
-      size_class = count(sqrt(min(max(contact, light)/dense, 1.0_dp)*grid%cells())*longer >= sizes)
+      size_class = count(min(max(contact, light)/dense, 1.0_dp)*grid%cells() >= sizes)
       if (contact <= sparse) size_class = min(size_class, largest_class)
-      if (max(grid%dx/grid%dy, grid%dy/grid%dx) > oblong .or. min(grid%nx, grid%ny) == 1) &
-         size_class = max(size_class, least_class)
    end function size_class
 
    !> Choose the direction of an iteration according to the phase, and set the phase of the next one.
@@ -134,10 +137,12 @@ contains
       call work%preconditioner%blocks%stiffen_mean(stiffness)
       call work%preconditioner%set_residual(work%coarse, work%active, work%scale, measure%level, pressure, gap)
       work%preconditioner%fixed_load = fixed_load
-      now%releases = now%may_release .and. .not. work%preconditioner%by_waves
+      now%releases = now%pause == 0 .and. .not. work%preconditioner%by_waves
+      now%pause = max(now%pause - 1, 0)
       now%class = size_class(work%grid, measure%contact)
-      steps = merge(steps_before(now%class), steps_alone(now%class), now%releases)
+      steps = now%more + merge(steps_before(now%class), steps_alone(now%class), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
+      if (now%rz > 0.0_dp .and. rz > slow*now%rz) now%more = min(now%more + added, most_added)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, rz, now%rz)
       now%rz = rz
@@ -196,7 +201,7 @@ contains
       fixed_load = task%control == control_pressure
       alpha = trial_length(work, task%modulus, now)
       if (is_releasing(now)) then
-         call release_and_try(work, task, alpha, now%class, pressure, trial)
+         call release_and_try(work, task, alpha, now%more + steps_after(now%class), pressure, trial)
       else
          call try_pressure(work, alpha, pressure, trial)
       end if
@@ -221,19 +226,19 @@ contains
    !> the load that this takes from the contact around them returns to the whole of it, and on a long grid the energy of such
    !> an error of the longest waves is so large that little of the step can be taken, and hardly a cell leaves the contact.
    !> There, and on free grids, such cells are released in their turn.
-   subroutine release_and_try(work, task, alpha, class, pressure, trial)
+   subroutine release_and_try(work, task, alpha, steps, pressure, trial)
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
       real(dp), intent(in) :: alpha
-      integer, intent(in) :: class
+      integer, intent(in) :: steps                     !! of the preconditioner, after each release
       real(dp), contiguous, intent(in) :: pressure(:, :)
       type(trial_sums_type), intent(out) :: trial
       real(dp) :: surplus
       integer :: k
 
       do k = 1, most_releases
-         call work%preconditioner%release(work%coarse, work%active, steps_after(class), trial_type(alpha, work%offset), &
-            pressure, work%direction(:, :, as_formed))
+         call work%preconditioner%release(work%coarse, work%active, steps, trial_type(alpha, work%offset), pressure, &
+            work%direction(:, :, as_formed))
          call try_pressure(work, alpha, pressure, trial)
          if (k == most_releases .or. .not. work%preconditioner%long_waves%matter) exit
          if (trial%cells < 1.0_dp .or. -trial%below <= negligible*trial%above) exit
@@ -278,7 +283,8 @@ contains
          now%kappa = shortening*now%kappa
          now%phase = merge(phase_plain, phase_restart, now%kappa > often_shortened)
          if (now%kappa > misled .and. now%releases) then
-            now%may_release = .false.
+            now%pause = now%next_pause
+            now%next_pause = 2*now%next_pause
             now%kappa = 1.0_dp
          end if
       end if

@@ -22,9 +22,10 @@ module normal_passes
 
    integer, parameter, public :: as_formed = 1, lowered = 2   !! directions of `normal_work_type`
 
-   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open and square. It is about
-   !> twice the inverse compliance of an open cell that is surrounded by cells in contact.
-   real(dp), parameter :: of_open_cells = 2.0_dp
+   !> Stiffness of the mean at a given approach, in the units of the model, if all cells are open and square. It is about two
+   !> thirds of the inverse compliance of an open cell that is surrounded by cells in contact. With a larger stiffness the
+   !> conjugate gradients of the preconditioner would need more steps.
+   real(dp), parameter :: of_open_cells = 4.0_dp
 
    !> The work fields of a solver, with the active blocks, the preconditioner and the sums.
    type :: normal_work_type
