@@ -7,6 +7,7 @@ python tools/campaign_contact.py hertz              errors of single contacts of
 python tools/campaign_contact.py oblong             iterations with cells longer than wide
 python tools/campaign_contact.py long               iterations on grids longer than wide
 python tools/campaign_contact.py strips 150         errors and iterations on strips of any length
+python tools/campaign_contact.py shapes 300         the same of noise, walks, waves; any cells
 python tools/campaign_contact.py edge               iterations of contacts at the edge of free maps
 python tools/campaign_contact.py pull               errors of the pull-off force of spheres
 """
@@ -260,8 +261,8 @@ def long():
             print(f"{nx} x {ny} cells, {control}: iterations {', '.join(numbers)}")
 
 
-def strip_road(rng):
-    """Draw a periodic road of any length and width, with its sides in cells of any shape."""
+def strip_contact(rng):
+    """Draw a road of any length and width, with its sides in cells of any shape, and a load."""
     nx, ny = int(10 ** rng.uniform(1, 4)), int(10 ** rng.uniform(0, 2))
     qx, qy = np.fft.fftfreq(nx), np.fft.fftfreq(ny)[:, np.newaxis]
     wave_number = np.hypot(qx, qy)
@@ -272,12 +273,37 @@ def strip_road(rng):
     height = np.fft.ifft2(amplitude * phase).real
     slope = math.sqrt(np.mean(np.diff(height, axis=1) ** 2))
     if slope == 0.0:
-        return strip_road(rng)
+        return strip_contact(rng)
     height *= 0.1 / slope
+    load = {"pressure": 0.1 * 10 ** rng.uniform(-3, 0.2)}
     dx, dy = 10 ** rng.uniform(-0.5, 0.5, 2)
     if ny > 1 and rng.random() < 0.5:
-        return np.ascontiguousarray(height.T), ny * dx, nx * dy
-    return height, nx * dx, ny * dy if ny > 1 else None
+        return np.ascontiguousarray(height.T), ny * dx, nx * dy, load
+    return height, nx * dx, ny * dy if ny > 1 else None, load
+
+
+def shaped_contact(rng):
+    """Draw white noise, a random walk or some waves on cells of any shape, and an approach."""
+    cells = 0
+    while not 200 < cells < 60000:
+        nx, ny = (int(n) for n in 10 ** rng.uniform((1.3, 0.3), (3.7, 2.6)))
+        cells = nx * ny
+    kind = rng.integers(3)
+    if kind == 2:
+        x, y = np.arange(nx) / nx, np.arange(ny)[:, np.newaxis] / ny
+        height = sum(np.cos(2 * np.pi * (i * x + j * y) + phase) for i, j, phase in zip(
+            rng.integers(1, 4, 3), rng.integers(0, 4, 3), rng.uniform(0, 6, 3), strict=True))
+    else:
+        height = rng.standard_normal((ny, nx))
+    if kind == 1:
+        height = np.cumsum(height, axis=1)
+        height -= np.linspace(0, 1, nx) * height[:, -1:]
+        height = np.minimum(height, np.quantile(height, 0.8))
+    dy = 10 ** rng.uniform(-2, 2)
+    load = {"displacement": (height.max() - height.mean()) * 10 ** rng.uniform(-2, -0.01)}
+    if rng.random() < 0.5:
+        return np.ascontiguousarray(height.T), float(ny), nx * dy, load
+    return height, float(nx), ny * dy, load
 
 
 def faults_of_contact(found, height, lx, ly):
@@ -297,12 +323,11 @@ def faults_of_contact(found, height, lx, ly):
     return (level - gap.min()) / height.std(), distance / height.std()
 
 
-def strips(rng, count):
-    """Solve contacts of strips under a load and at its approach; print errors and iterations."""
+def periodic(rng, count, draw):
+    """Solve contacts at a given load and approach, one after the other; print their errors."""
     iterations, gaps, distances, missing = [], [], [], 0
     for _ in range(count):
-        height, lx, ly = strip_road(rng)
-        control = {"pressure": 0.1 * 10 ** rng.uniform(-3, 0.2)}
+        height, lx, ly, control = draw(rng)
         for _ in range(2):
             try:
                 found = asperity.solve_normal(height, lx, ly, 1.0, **control)
@@ -315,10 +340,12 @@ def strips(rng, count):
             gap, distance = faults_of_contact(found, height, lx, ly)
             gaps.append(gap)
             distances.append(distance)
-            control = {"displacement": found.displacement}
+            control = ({"displacement": found.displacement} if "pressure" in control
+                       else {"pressure": found.pressure.mean()})
     print(f"{len(iterations)} contacts, {missing} not converged; iterations: median "
-          f"{np.median(iterations):g}, most {max(iterations)}; largest duality gap "
-          f"{max(gaps):.1e} and distance of loaded cells {max(distances):.1e} of the rms height")
+          f"{np.median(iterations):g}, 95 % {np.quantile(iterations, 0.95):.0f}, most "
+          f"{max(iterations)}; largest duality gap {max(gaps):.1e} and distance of loaded cells "
+          f"{max(distances):.1e} of the rms height")
 
 
 def edge():
@@ -340,7 +367,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=["normal", "extreme", "sizes", "hertz", "pull", "oblong",
-                                         "long", "strips", "edge"])
+                                         "long", "strips", "shapes", "edge"])
     parser.add_argument("count", nargs="?", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
@@ -357,7 +384,9 @@ def main():
     elif given.what == "long":
         long()
     elif given.what == "strips":
-        strips(rng, given.count)
+        periodic(rng, given.count, strip_contact)
+    elif given.what == "shapes":
+        periodic(rng, given.count, shaped_contact)
     elif given.what == "edge":
         edge()
     elif given.what == "normal":

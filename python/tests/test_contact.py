@@ -109,7 +109,8 @@ def test_a_limit_of_iterations_is_not_convergence(method):
         try:
             found = asperity.solve_normal(height, 1.0, 1.0, 1.0, max_iterations=limit, **given)
         except asperity.NotConverged as error:
-            stopped += error.result.residual <= 1e-4
+            assert error.result.residual > 1e-4
+            stopped += 1
         else:
             assert found.force == pytest.approx(force, rel=1e-2)
     assert stopped
@@ -163,6 +164,65 @@ def test_strips_of_any_length(nx, ny, lx, ly):
         assert pressure.mean() == pytest.approx(0.003, rel=1e-4)
         assert contact.iterations <= 25
         control = {"displacement": contact.displacement}
+
+
+@pytest.mark.filterwarnings("ignore:patches of contact", "ignore:cells of")
+@pytest.mark.parametrize(("kind", "nx", "ny", "ratio", "part"), [
+    ("noise", 4, 800, 99.0, 0.95), ("noise", 8, 400, 20.0, 0.6), ("noise", 400, 8, 1 / 30, 0.5),
+    ("noise", 2, 2000, 5.0, 0.6), ("walk", 2, 1500, 1.0, 0.6), ("walk", 3, 2339, 0.2, 0.3),
+    ("waves", 8, 2671, 30.0, 0.5)])
+def test_grids_of_any_shape_at_a_given_approach(kind, nx, ny, ratio, part):
+    """Such contacts took hundreds of iterations, because the residual was extended too little."""
+    height = np.random.default_rng(nx + ny).standard_normal((ny, nx))
+    if kind == "walk":
+        height = np.cumsum(height, axis=0)
+        height -= np.linspace(0, 1, ny)[:, np.newaxis] * height[-1]
+        height = np.minimum(height, np.quantile(height, 0.8))
+    elif kind == "waves":
+        height = (np.cos(4 * np.pi * np.arange(nx) / nx)
+                  + np.cos(2 * np.pi * np.arange(ny) / ny)[:, np.newaxis])
+    displacement = part * (height.max() - height.mean())
+    contact = asperity.solve_normal(height, nx, ny * ratio, 1.0, displacement=displacement)
+
+    modulus = np.pi * np.hypot(np.fft.fftfreq(nx), np.fft.fftfreq(ny, ratio)[:, np.newaxis])
+    modulus[0, 0] = np.inf
+    gap = np.fft.ifft2(np.fft.fft2(contact.pressure) / modulus).real - height
+    gap += height.max() - displacement                # of the far solid from the highest cell
+    assert contact.pressure.min() >= 0
+    assert gap.min() >= -1e-6 * height.std()
+    assert np.average(np.abs(gap), weights=contact.pressure) <= 1.1e-6 * height.std()
+    assert contact.iterations <= 50
+    # A start from this contact needs no more iterations than none.
+    pressure = contact.pressure.mean()
+    again = asperity.solve_normal(height, nx, ny * ratio, 1.0, pressure=pressure, start=contact)
+    assert again.iterations <= 1
+    warm = asperity.solve_normal(height, nx, ny * ratio, 1.0, pressure=pressure / 3, start=contact)
+    assert warm.iterations <= 40
+
+
+@pytest.mark.filterwarnings("ignore:patches of contact")
+@pytest.mark.parametrize("control", [{"force": 1e-3}, {"displacement": 0.01}])
+def test_the_residual_of_a_small_contact(control):
+    """It is relative to ten times the displacement, if that is less than the rms height."""
+    x = np.arange(64) - 32.0
+    height = -(x**2 + x[:, np.newaxis] ** 2) / 2e3
+    contact = asperity.solve_normal(height, 64.0, 64.0, 1.0, boundary="free", **control)
+    load = contact.pressure / contact.pressure.sum()
+    gap = contact.gap + height                        # the displacement, but for a constant
+    scale = 10 * (load * (gap + contact.displacement - height.max())).sum()
+    assert scale < 0.5 * height.std()
+    error = (load * contact.gap).sum() - contact.gap.min()
+    assert 0.5 * error / scale <= contact.residual <= 1.01 * error / scale
+
+
+def test_a_flat_map_at_its_first_touch():
+    for height in (0.0, 0.1, 1000 / 3):
+        for displacement in (0.0, -1e-20):
+            contact = asperity.solve_normal(np.full((10, 10), height), 1.0, 1.0, 1.0,
+                                            displacement=displacement)
+            assert contact.converged and not contact.pressure.any()
+        with pytest.raises(ValueError, match="below 0 m"):
+            asperity.solve_normal(np.full((10, 10), height), 1.0, 1.0, 1.0, displacement=1e-3)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])

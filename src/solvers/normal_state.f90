@@ -122,7 +122,7 @@ contains
          moved = problem%target*moved_length(grid)/problem%modulus
       else
          moved = abs(task%target)
-         if (grid%boundary == boundary_periodic) determined = problem%target < -mean
+         if (grid%boundary == boundary_periodic) determined = problem%target < -mean .or. task%target <= 0.0_dp
       end if
       resolved = 10.0_dp*epsilon(1.0_dp)*(moved + highest - lowest)
       if (highest - lowest <= resolved) then
@@ -222,7 +222,7 @@ contains
          measure%weighted_level = problem%target
          measure%duality_gap = max(measure%level - sums%least, 0.0_dp)
          if (sums%load > 0.0_dp) &
-            measure%duality_gap = max(measure%duality_gap, sums%distance/sums%load)
+            measure%duality_gap = max(measure%duality_gap, sums%distance/sums%load, measure%reached - sums%least)
       else if (sums%load > 0.0_dp) then
          measure%level = sums%touched/sums%cells
          measure%weighted_level = measure%reached
@@ -404,7 +404,7 @@ contains
       outcome%required = max(task%tolerance, task%accepted)
       outcome%converged = determined .and. measure%strict <= outcome%required
       if (outcome%converged) outcome%reason = reason_converged
-      outcome%residual = measure%error
+      outcome%residual = measure%strict
       outcome%load_error = measure%load_error
       !$omp parallel do default(none) shared(gap, measure) private(j) num_threads(threads)
       do j = 1, size(gap, 2)
