@@ -115,7 +115,7 @@ contains
       type(grid_type), intent(in) :: grid
       real(dp), intent(in) :: contact                  !! fraction of the cells
 
-      size_class = count(min(max(contact, light)/dense, 1.0_dp)*grid%cells() >= sizes)
+      size_class = count(sqrt(min(max(contact, light)/dense, 1.0_dp))*grid%cells() >= sizes)
       if (contact <= sparse) size_class = min(size_class, largest_class)
    end function size_class
 
