@@ -116,7 +116,8 @@ def solve_normal(
         'periodic' or 'free'.
     tolerance : float
         Largest allowed duality gap over (load times rms height), and largest relative error of the
-        load. Above 0 and below 1.
+        load. For a small contact ten times the mean displacement under the load replaces the rms
+        height, if it is less. Above 0 and below 1.
     max_iterations : int
         Largest number of iterations.
     method : str
