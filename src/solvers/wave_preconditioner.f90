@@ -37,6 +37,10 @@ module wave_preconditioner
 
    public :: new_wave_preconditioner, wave_preconditioner_type
 
+   !> Stiffness of the mean at a given approach over that of the longest wave along the short side of the grid: the one for
+   !> which random contacts take the fewest iterations.
+   real(dp), parameter :: given_approach = 6.0_dp
+
    !> The preconditioner. A variable of this type must not be copied.
    type :: wave_preconditioner_type
       type(grid_type), private :: grid
@@ -76,7 +80,7 @@ contains
       ! Under a given load the mean of the direction is removed, so that the factor of the mean hardly matters. At a
       ! given approach it determines the load, and the stiffness of a wave along the long side would take many
       ! iterations.
-      self%of_mean = coarse%kernel%compliance(2.0_dp*pi/coarse%h) &
+      self%of_mean = coarse%kernel%compliance(2.0_dp*pi/coarse%h)*[1.0_dp, given_approach] &
          /[coarse%kernel%compliance(pi/max(grid%lx, grid%ly)), coarse%kernel%compliance(pi/min(grid%lx, grid%ly))]
    end subroutine new_wave_preconditioner
 
