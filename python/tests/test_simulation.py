@@ -36,6 +36,24 @@ def ended(text, tmp_path, name="reference"):
     return asperity.run(text, output=tmp_path / f"{name}.h5").history
 
 
+def test_the_first_touch_of_a_ramp_in_mixed_precision():
+    """A step overflowed that was 1e20 times as large as the load before it, which was round-off."""
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        x, y = rng.uniform(0.3, 0.7, 2)
+        text = f"""&grid nx = 5, ny = 5, lx = 1.0 /
+            &surface shape = 'paraboloid', radius = 100.0, centre_x = {x}, centre_y = {y} /
+            &material shear_modulus = 1e6, prony_g = 40e6, prony_tau = 1e-3 /
+            &phase duration = 1e-3, steps = 3, displacement = {10**rng.uniform(-5, -3.5)},
+                   ramp = 'linear' /
+            &solver precision = 'mixed', tolerance = 1e-4 /"""
+        forces = []
+        for case in (text, text.replace("mixed", "double")):
+            rows = list(asperity.Simulation(asperity.Case.read(case)))
+            forces.append([row.force for row in rows])
+        np.testing.assert_allclose(*forces, rtol=3e-4, atol=1e-9 * max(forces[1]))
+
+
 @pytest.mark.parametrize("laws", ["", FRICTION])
 def test_the_numbers_are_those_of_a_run(tmp_path, laws):
     text = BASE + laws + SLIDE

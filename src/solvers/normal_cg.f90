@@ -54,7 +54,7 @@ module normal_cg
    use normal_state, only : combine_measures, control_approach, control_pressure, evaluate_gap, fault_of_problem, &
       first_pressure, gap_measure_type, narrow_scale, normal_problem_type, prepare_problem, reason_undetermined, &
       remove_round_off, return_solution
-   use normal_sums, only : state_sums_type, total
+   use normal_sums, only : total
    use omp_lib, only : omp_get_wtime
    use kernels, only : kernel_type
    use asperity_precision, only : dp, int64
@@ -138,7 +138,7 @@ contains
          if (outcome%stopped) return
          outcome%iterations = outcome%iterations + 1
          call choose_direction(self%work, task, measure, pressure, gap, now)
-         call choose_step(self%work, product, task, measure%level, pressure, gap, now)
+         call choose_step(self%work, product, task, measure, pressure, gap, now)
          if (now%alpha > 0.0_dp) then
             call update_state(self%work, product, task%target, now%alpha, task%modulus, pressure, gap)
             call watch%note_step()
@@ -227,12 +227,8 @@ contains
 
       !> Measure the present gap.
       subroutine measure_gap_now()
-         type(state_sums_type) :: sums
-
          call survey(self%work, task%target, pressure, gap)
-         sums = total(self%work%state)
-         measure = combine_measures(task, cells, sums)
-         if (watch%single) call self%quick%set_unit(sums%load/cells)
+         measure = combine_measures(task, cells, total(self%work%state))
       end subroutine measure_gap_now
 
       !> Measure the result with a new gap.

@@ -184,11 +184,11 @@ contains
 
    !> Choose the step of an iteration: a trial along the direction, projected on the admissible pressures, and the
    !> part of it that is taken. A step that does not descend is rejected (alpha = 0), and the next trial is shorter.
-   subroutine choose_step(work, product, task, level, pressure, gap, now)
+   subroutine choose_step(work, product, task, measure, pressure, gap, now)
       type(normal_work_type), intent(inout) :: work
       type(convolution_type), intent(inout) :: product
       type(normal_problem_type), intent(in) :: task
-      real(dp), intent(in) :: level                    !! m
+      type(gap_measure_type), intent(in) :: measure    !! of the present state
       real(dp), contiguous, intent(in) :: pressure(:, :), gap(:, :)
       type(iteration_type), intent(inout) :: now
       type(trial_sums_type) :: trial
@@ -212,7 +212,9 @@ contains
       if (work%preconditioner%by_waves .and. now%preconditioned) call keep_block_sums(work, pressure, trial)
       call find_clip(work, fixed_load, task%target*work%grid%cells(), pressure, trial, clipped)
       if (work%preconditioner%released) work%offset = work%offset + work%trial%shift/alpha
-      call project_step(work, product, level, pressure, gap, sums)
+      ! The step may be many orders larger than the present load, which may be round-off at the first touch.
+      call product%set_unit(max(measure%load, trial%above)/work%grid%cells())
+      call project_step(work, product, measure%level, pressure, gap, sums)
       if (sums%slope > 0.0_dp) then
          call choose_length(work, product, task%modulus, pressure, clipped, sums, now)
       else
