@@ -192,12 +192,13 @@ def test_grids_of_any_shape_at_a_given_approach(kind, nx, ny, ratio, part):
     assert gap.min() >= -1e-6 * height.std()
     assert np.average(np.abs(gap), weights=contact.pressure) <= 1.1e-6 * height.std()
     assert contact.iterations <= 50
-    # A start from this contact needs no more iterations than none.
+    # A start from this contact takes hardly more iterations than none.
     pressure = contact.pressure.mean()
     again = asperity.solve_normal(height, nx, ny * ratio, 1.0, pressure=pressure, start=contact)
     assert again.iterations <= 1
+    cold = asperity.solve_normal(height, nx, ny * ratio, 1.0, pressure=pressure / 3)
     warm = asperity.solve_normal(height, nx, ny * ratio, 1.0, pressure=pressure / 3, start=contact)
-    assert warm.iterations <= 40
+    assert warm.iterations <= 1.5 * cold.iterations
 
 
 @pytest.mark.filterwarnings("ignore:patches of contact")
@@ -215,14 +216,18 @@ def test_the_residual_of_a_small_contact(control):
     assert 0.5 * error / scale <= contact.residual <= 1.01 * error / scale
 
 
-def test_a_flat_map_at_its_first_touch():
-    for height in (0.0, 0.1, 1000 / 3):
-        for displacement in (0.0, -1e-20):
-            contact = asperity.solve_normal(np.full((10, 10), height), 1.0, 1.0, 1.0,
-                                            displacement=displacement)
-            assert contact.converged and not contact.pressure.any()
-        with pytest.raises(ValueError, match="below 0 m"):
-            asperity.solve_normal(np.full((10, 10), height), 1.0, 1.0, 1.0, displacement=1e-3)
+@pytest.mark.parametrize("height", [0.0, 0.1, 1000 / 3])
+def test_a_flat_map_at_its_first_touch(height):
+    """With adhesion the cells stick at the first touch, and the pressure is not determined."""
+    flat = np.full((10, 10), height)
+    for displacement in (0.0, -1e-20):
+        contact = asperity.solve_normal(flat, 1.0, 1.0, 1.0, displacement=displacement)
+        assert contact.converged and not contact.pressure.any()
+    with pytest.raises(ValueError, match="below 0 m"):
+        asperity.solve_normal(flat, 1.0, 1.0, 1.0, displacement=1e-3)
+    with pytest.raises(ValueError, match="below 0 m"):
+        asperity.solve_adhesive(flat, 1.0, 1.0, 1.0, displacement=0.0, potential="exponential",
+                                energy=1e-3, range=1e-2)
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "free"])

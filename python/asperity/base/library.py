@@ -223,7 +223,7 @@ def contact_map(height: ArrayLike, lx: float, ly: float | None, boundary: str
 def check_depth(displacement: float, array: NDArray[np.float64]) -> None:
     """Refuse a displacement that brings a periodic map into full contact."""
     deepest = float(array.max()) - float(array.mean()) if np.ptp(array) > 0.0 else 0.0
-    if displacement > 0.0 and displacement >= deepest:
+    if displacement >= deepest:
         raise ValueError(
             f"displacement = {displacement}: must be below {deepest:.10g} m, the mean gap at"
             " first touch: beyond it the pressure of a periodic contact is not determined")

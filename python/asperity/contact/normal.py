@@ -165,7 +165,7 @@ def solve_normal(
     top = float(array.max())
     if control == "displacement":
         target -= top
-        if not free:
+        if not free and load > 0.0:
             library.check_depth(load, array)
     elif control == "force":
         target /= lx * ly
