@@ -65,8 +65,8 @@ module normal_iteration
    integer, parameter :: steps_before(0:6) = [1, 1, 1, 2, 3, 4, 5]
    integer, parameter :: steps_after(0:6) = [1, 2, 3, 3, 4, 5, 6]
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
-   ! Contacts of noise, long strips and oblong cells need more steps than rough roads. They show it: an iteration after which
-   ! r.M r is more than this part of that before lets all later ones take more steps.
+   ! Contacts of noise, long strips and oblong cells need more steps than rough roads, and otherwise converge slowly. After
+   ! each iteration that leaves more than this part of r.M r, all later ones take more steps.
    real(dp), parameter :: slow = 0.2_dp
    integer, parameter :: added = 2                !! steps after each slow iteration
    integer, parameter :: most_added = 10
@@ -85,7 +85,7 @@ module normal_iteration
    type :: iteration_type
       integer :: phase = phase_restart      !! how the next direction is formed
       logical :: preconditioned = .false.   !! the present direction is not a plain one
-      integer :: pause = 0                  !! iterations that still release no cells, because such steps have failed
+      integer :: pause = 0                  !! iterations still to come without a release, because steps with one have failed
       integer :: next_pause = 6             !! the number of them after the next failure
       logical :: releases = .false.         !! the cells with a negative trial pressure are released
       logical :: free_mean = .false.        !! the load is not given, and a uniform pressure strains nothing
