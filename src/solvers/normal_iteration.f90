@@ -67,7 +67,7 @@ module normal_iteration
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
    ! Contacts of noise, long strips and oblong cells need more steps than rough roads, and otherwise converge slowly. After
    ! each iteration that leaves more than this part of r.M r, all later ones take more steps.
-   real(dp), parameter :: slow = 0.2_dp
+   real(dp), parameter :: slow = 0.35_dp
    integer, parameter :: added = 2                !! steps after each slow iteration
    integer, parameter :: most_added = 10
    ! On a long or free grid the cells whose trial pressure is negative after a release are released, too.
