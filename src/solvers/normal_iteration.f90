@@ -66,7 +66,7 @@ module normal_iteration
    integer, parameter :: steps_after(0:6) = [1, 2, 3, 3, 4, 5, 6]
    integer, parameter :: steps_alone(0:6) = [0, 0, 2, 2, 2, 2, 2]   !! if no cells are released
    ! Contacts of noise, long strips and oblong cells need more steps than rough roads, and otherwise converge slowly. After
-   ! each iteration that leaves more than this part of r.M r, all later ones take more steps.
+   ! each iteration that leaves more than this part of r.M r, all later ones take more steps (see `note_progress`).
    real(dp), parameter :: slow = 0.35_dp
    integer, parameter :: added = 2                !! steps after each slow iteration
    integer, parameter :: most_added = 10
@@ -142,7 +142,7 @@ contains
       now%class = size_class(work%grid, measure%contact)
       steps = now%more + merge(steps_before(now%class), steps_alone(now%class), now%releases)
       call work%preconditioner%extend(work%coarse, work%active, steps, rz)
-      if (now%rz > 0.0_dp .and. rz > slow*now%rz) now%more = min(now%more + added, most_added)
+      call note_progress(now, measure%contact, rz)
       beta = 0.0_dp
       if (now%phase == phase_conjugate .and. now%rz > 0.0_dp) beta = conjugacy_factor(work, rz, now%rz)
       now%rz = rz
@@ -160,6 +160,17 @@ contains
       now%phase = merge(phase_conjugate, phase_restart, now%preconditioned)
       if (now%slope <= 0.0_dp) call end_loop(now, 'no direction of descent is left')
    end subroutine choose_direction
+
+   !> Add steps of the preconditioner to all later iterations if the last one has left much of r.M r. In a sparse contact on
+   !> a large grid they would cost more time than the iterations that they save.
+   pure subroutine note_progress(now, contact, rz)
+      type(iteration_type), intent(inout) :: now
+      real(dp), intent(in) :: contact                  !! fraction of the cells
+      real(dp), intent(in) :: rz                       !! r.M r of the new residual
+
+      if (contact <= sparse .and. now%class == largest_class) return
+      if (now%rz > 0.0_dp .and. rz > slow*now%rz) now%more = min(now%more + added, most_added)
+   end subroutine note_progress
 
    !> Compute beta, the multiple of the old direction that the new one keeps.
    !>
