@@ -12,6 +12,7 @@ import pytest
 import asperity
 from asperity import NotConverged
 from asperity.__main__ import main
+from asperity.curves.sources import compound_of
 from asperity.dma import DmaTable, fit_dma, read_dma
 from asperity.material import WLF, Prony
 
@@ -523,6 +524,16 @@ def test_vertical_shifts_are_found_and_written(tmp_path):
     values = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
     np.testing.assert_allclose(values[:, 2], 10.0 ** values[:, 1])
     np.testing.assert_allclose(values[:, 3], rise, rtol=8e-3)
+    written = tmp_path / "cold.nml"
+    written.write_text(fit.to_namelist(temperature=0.0))
+    group = asperity.Case.read(written).material
+    at_rest = float(rise[0]) * rubber.g_inf
+    assert group.temperature == 0.0 and group.shear_modulus == pytest.approx(at_rest, rel=0.03)
+    cold_rubber = compound_of(written)
+    assert cold_rubber.at(0.0).g_inf == pytest.approx(group.shear_modulus, rel=2e-3)
+    assert cold_rubber.at(20.0).g_inf == pytest.approx(fit.material.g_inf, rel=1e-12)
+    with pytest.raises(ValueError, match=r"temperature = 40: .* gives b_T from 0 to 30 C only"):
+        fit.to_namelist(temperature=40.0)
 
 
 def test_commas_between_thousands(tmp_path):

@@ -332,9 +332,11 @@ def test_a_typing_error_in_the_first_point_is_an_error(tmp_path):
 
 @pytest.mark.parametrize("corner", ["", "1", "y\\x [mm]"])
 @pytest.mark.parametrize("separator", ["\t", ";", ","])
-def test_coordinates_beside_a_matrix_are_no_heights(tmp_path, corner, separator):
+@pytest.mark.parametrize("height", [1.0, 1e-2])
+def test_coordinates_beside_a_matrix_are_no_heights(tmp_path, corner, separator, height):
+    """Also if the map is much longer than high, as most are."""
     x, y = 0.05 * np.arange(30), 0.1 * np.arange(20)
-    heights = np.random.default_rng(1).normal(size=(20, 30))
+    heights = height * np.random.default_rng(1).normal(size=(20, 30))
     rows = [[corner, *(f"{value:.2f}" for value in x)],
             *([f"{at:.2f}", *(f"{value:.4f}" for value in row)]
               for at, row in zip(y, heights, strict=True))]

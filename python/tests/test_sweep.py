@@ -208,7 +208,7 @@ def test_finished_results_are_kept(tmp_path, capsys):
 
 
 def test_a_failing_case_does_not_lose_the_others(tmp_path):
-    case = wave(solver=dict(max_iterations=3, tolerance=1e-9))
+    case = wave(grid=dict(nx=272), solver=dict(max_iterations=3, tolerance=1e-9))
     parameters = {"phase.pressure": [0.1 * FULL, 5 * FULL]}
     with pytest.raises(asperity.SweepError, match=r"1 of 2 cases failed.*\n.*did not converge"
                        ) as caught:
@@ -219,6 +219,8 @@ def test_a_failing_case_does_not_lose_the_others(tmp_path):
     assert isinstance(failure, Failure)
     assert (failure.index, failure.status) == (0, 4)
     assert failure.parameters == {"phase.pressure": 0.1 * FULL}
+    reason, warned = failure.message.splitlines()
+    assert "did not converge" in reason and "before: &grid: nx = 272 has the prime factor" in warned
     assert "1 failed" in repr(table)
     kept = sweep(case, parameters, folder=tmp_path, errors="keep")
     assert len(kept.failed) == 1 and kept.contact_area[1] == 1.0

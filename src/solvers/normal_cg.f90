@@ -10,7 +10,7 @@
 !> * a preconditioner whose symbol is about |q|, with the wave number q; it consists of a local stencil and block means,
 !>   and the residual is extended outside the contact for it (module `schur_preconditioner`);
 !> * cells in which the step would make the pressure negative are released from the contact before the step, and the
-!>   step of the other cells takes this into account (module `schur_release`), on long and free grids several times;
+!>   step of the other cells takes this into account (module `schur_release`), on long, free and very large grids several times;
 !> * a step length that the preconditioner knows, so that the projected step s is known before the transform, and an
 !>   iteration always takes two transforms;
 !> * passes over active blocks of 16 cells only, except the one that updates the gap.

@@ -70,8 +70,9 @@ module normal_iteration
    real(dp), parameter :: slow = 0.35_dp
    integer, parameter :: added = 2                !! steps after each slow iteration
    integer, parameter :: most_added = 10
-   ! On a long or free grid the cells whose trial pressure is negative after a release are released, too.
+   ! On a long, free or very large grid the cells whose trial pressure is negative after a release are released, too.
    integer, parameter :: most_releases = 3
+   real(dp), parameter :: very_large = 3e7_dp    !! cells
    real(dp), parameter :: negligible = 1e-5_dp   !! negative part of a trial pressure that is only clipped
 
    ! A contact that is a part of the grid needs no more steps than a dense one on a smaller grid.
@@ -238,7 +239,7 @@ contains
    !> The change of the direction makes other cells negative. On most grids it is enough that the projection clips them. But
    !> the load that this takes from the contact around them returns to the whole of it, and on a long grid the energy of such
    !> an error of the longest waves is so large that little of the step can be taken, and hardly a cell leaves the contact.
-   !> There, and on free grids, such cells are released in their turn.
+   !> There, on very large grids, whose waves are long as well, and on free grids, such cells are released in their turn.
    subroutine release_and_try(work, task, alpha, steps, pressure, trial)
       type(normal_work_type), intent(inout) :: work
       type(normal_problem_type), intent(in) :: task
@@ -247,13 +248,15 @@ contains
       real(dp), contiguous, intent(in) :: pressure(:, :)
       type(trial_sums_type), intent(out) :: trial
       real(dp) :: surplus
+      logical :: repeats
       integer :: k
 
+      repeats = work%preconditioner%long_waves%matter .or. work%grid%cells() >= very_large
       do k = 1, most_releases
          call work%preconditioner%release(work%coarse, work%active, steps, trial_type(alpha, work%offset), pressure, &
             work%direction(:, :, as_formed))
          call try_pressure(work, alpha, pressure, trial)
-         if (k == most_releases .or. .not. work%preconditioner%long_waves%matter) exit
+         if (k == most_releases .or. .not. repeats) exit
          if (trial%cells < 1.0_dp .or. -trial%below <= negligible*trial%above) exit
 
          ! The next release starts from a trial pressure that has the given load with its negative parts.

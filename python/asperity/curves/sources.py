@@ -359,25 +359,31 @@ def _of_namelist(path: Path) -> Compound:
         wlf = WLF(float(group.wlf_c1), float(group.wlf_c2), reference)
     given = reference if group.temperature is None else float(group.temperature)
     poisson = poisson_ratio(float(group.poisson or 0.0))
-    valid_range, shifts, vertical = _of_comments(path)
+    valid_range, shifts, vertical, rise = _of_comments(path)
+    series = Prony(series.g_inf / rise, series.g / rise, series.tau)
     return Compound(series, reference, wlf, shifts if wlf else {}, vertical if wlf else {},
                     valid_range=valid_range, name=path.name, poisson=poisson, usual=given)
 
 
 def _of_comments(path: Path) -> tuple[tuple[float, float] | None, dict[float, float],
-                                      dict[float, float]]:
+                                      dict[float, float], float]:
     """Return what `asperity fit` writes as comments.
 
-    These are the range of the measured frequencies, and the horizontal and the vertical shifts.
+    These are the range of the measured frequencies, the horizontal and the vertical shifts, and
+    b_T if the moduli of the group are multiplied by it.
     """
     found: tuple[float, float] | None = None
+    rise = 1.0
     shifts: dict[str, dict[float, float]] = {"a_T": {}, "b_T": {}}
     for line in text_of(path).splitlines():
         range_ = re.match(r"! valid range: (\S+) to (\S+) rad/s", line)
         if range_ and is_number(range_[1]) and is_number(range_[2]):
             found = float(range_[1]), float(range_[2])
+        factor = re.match(r"! moduli of the group: times b_T = (\S+) at ", line)
+        if factor and is_number(factor[1]):
+            rise = float(factor[1])
         kind = re.match(r"! (?:vertical )?shifts \(log10 ([ab]_T)\): ", line)
         if kind:
             shifts[kind[1]] = {float(celsius): float(shift) for celsius, shift
                                in re.findall(r"(-?[\d.]+(?:e[-+]?\d+)?) C ([-+][\d.]+)", line)}
-    return found, shifts["a_T"], shifts["b_T"]
+    return found, shifts["a_T"], shifts["b_T"], rise

@@ -19,7 +19,7 @@ _MARKS = tuple(sign * mark for mark in (999.0, 9999.0, 99999.0, 999999.0, 32767.
 _FAR = 20.0         # least distance of a mark from the heights, over their range
 _LEAST = 8          # fewest coordinates that are recognised
 _EVEN = 0.02        # largest difference of two steps between coordinates, over the step
-_UNEVEN = 0.5       # the least difference of two steps between heights beside them
+_UNEVEN = 0.5       # the least difference of two steps between heights beside them, over their mean
 
 
 def refuse_other_numbers(path: Path, array: FloatArray) -> None:
@@ -69,8 +69,10 @@ def _are_coordinates(line: FloatArray, beside: FloatArray) -> bool:
     Examples
     --------
     >>> x = np.arange(20.0)
-    >>> _are_coordinates(0.1 * x, np.sin(x)), _are_coordinates(0.1 * x, 0.1 * x + 1.0)
-    (True, False)
+    >>> _are_coordinates(0.1 * x, np.sin(x)), _are_coordinates(1e3 * x, np.sin(x))
+    (True, True)
+    >>> _are_coordinates(0.1 * x, 0.1 * x + 1.0)
+    False
     """
     steps, others = np.diff(line[1:]), np.diff(beside[1:])
     if steps.size < _LEAST - 1 or not np.all(np.isfinite(steps)) or steps[0] == 0.0:
@@ -79,4 +81,4 @@ def _are_coordinates(line: FloatArray, beside: FloatArray) -> bool:
     if np.ptp(steps) > _EVEN * abs(step):
         return False
     known = others[np.isfinite(others)]
-    return bool(known.size and np.ptp(known) > _UNEVEN * abs(step))
+    return bool(known.size and np.ptp(known) > _UNEVEN * abs(float(np.mean(known))))

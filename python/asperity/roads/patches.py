@@ -296,6 +296,26 @@ class DrawnRoad:
         return Patch(height, self.side, self.side, label)
 
 
+def _good_length(most: int) -> int:
+    """Return the largest even number up to a limit whose Fourier transforms are fast.
+
+    Its only prime factors are 2, 3 and 5. Below 2 it is 0.
+
+    Examples
+    --------
+    >>> _good_length(204), _good_length(127), _good_length(1)
+    (200, 120, 0)
+    """
+    for length in range(most - most % 2, 0, -2):
+        rest = length
+        for prime in (2, 3, 5):
+            while rest % prime == 0:
+                rest //= prime
+        if rest == 1:
+            return length
+    return 0
+
+
 class MeasuredRoad:
     """A road whose patches are cut from measured maps.
 
@@ -407,10 +427,12 @@ class MeasuredRoad:
         return Patch(height - height.mean(), lx, ly, label)
 
     def _cells(self, fewest: int, cells: int) -> int:
-        """Return the number of cells along a side for which the maps have room; it is even."""
+        """Return the number of cells along a side for which the maps have room; it is even.
+
+        If it is less than wanted, its Fourier transforms are fast.
+        """
         room = math.floor(fewest / (margin_of(1000, self.join) / 1000 + 1.0))
-        found = min(cells, room)
-        found -= found % 2
+        found = cells - cells % 2 if cells <= room else _good_length(room)
         if found < 16:
             raise ValueError(f"cells = {cells}: the maps have {fewest} cells along the shorter"
                              f" side: patches of {max(found, 0)} cells: must be at least 16")

@@ -15,6 +15,7 @@ from ..base.check import instance, number, positive, shown
 from ..base.files import SHIFTS, SHIFTS_HEAD, check_output, write_text
 from ..base.names import counted
 from ..base.presenters import present
+from .compound import Compound
 from .dma_outliers import outlier_notes
 from .dma_sweeps import Sweep, drift_note, sweeps_of
 from .dma_table import DmaTable
@@ -128,7 +129,8 @@ class DmaFit:
             Poisson ratio.
         temperature : float, optional
             Temperature of the simulation, C; by default the reference temperature. Any other needs
-            WLF constants.
+            WLF constants. With vertical shifts, the moduli of the group are those at this
+            temperature, because a group has no place for b_T; a comment tells the factor.
 
         Returns
         -------
@@ -138,18 +140,29 @@ class DmaFit:
         Raises
         ------
         ValueError
-            If the shift to the temperature is not known.
+            If the shift to the temperature is not known, or the temperature is outside the measured
+            ones and there are vertical shifts.
         """
         comment = "".join(f"! {line}\n" for line in self.summary().splitlines())
+        material = self.material
+        if self.wlf and self.vertical_shifts and temperature not in (None, self.reference):
+            rise = self._compound().b_t(number("temperature", temperature))
+            material = Prony(rise * material.g_inf, rise * material.g, material.tau)
+            comment += f"! moduli of the group: times b_T = {rise!r} at {temperature:g} C\n"
         if self.wlf is None:
             if temperature is not None and temperature != self.reference:
                 raise ValueError(
                     f"temperature = {temperature:g}: the data give no WLF constants: give them"
                     " (wlf, --wlf C1 C2)")
-            return comment + self.material.to_namelist(poisson=poisson)
-        return comment + self.material.to_namelist(
+            return comment + material.to_namelist(poisson=poisson)
+        return comment + material.to_namelist(
             poisson=poisson, wlf=self.wlf,
             temperature=self.wlf.t_ref if temperature is None else temperature)
+
+    def _compound(self) -> Compound:
+        """Return the rubber with its shifts."""
+        return Compound(self.material, self.reference, self.wlf, dict(self.shifts),
+                        dict(self.vertical_shifts), self.valid_range, self.name, list(self.notes))
 
     def write_shifts(self, path: str | Path) -> Path:
         """Write the shifts as a table with the columns temperature (C), log10_a_t, a_t, b_t.

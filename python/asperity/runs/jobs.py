@@ -317,11 +317,29 @@ def _finish(job: Job) -> bool:
         return True
     job.status = status
     if status:
-        reason = printed or f"the program ended with status {status}"
+        reason = _reason_first(status, printed) or f"the program ended with status {status}"
         job.message = f"killed by signal {-status}" if status < 0 else reason
     elif printed:
         job.message = printed
     return False
+
+
+def _reason_first(status: int, printed: str) -> str:
+    """Return what a failed program has printed, with the reason before the warnings.
+
+    The program prints the reason last, except for faults of the input, which have no warnings
+    before them.
+
+    Examples
+    --------
+    >>> print(_reason_first(4, "&surface: short waves\\nstep 0: the solver did not converge"))
+    step 0: the solver did not converge
+    before: &surface: short waves
+    """
+    *warned, reason = printed.splitlines() or [""]
+    if status == 2 or not warned:
+        return printed
+    return "\n".join([reason, *(f"before: {line}" for line in warned)])
 
 
 def is_used(job: Job) -> bool:
