@@ -325,14 +325,14 @@ def _finish(job: Job) -> bool:
 
 
 def _reason_first(status: int, printed: str) -> str:
-    """Return what a failed program has printed, with the reason before the warnings.
+    r"""Return what a failed program has printed, with the reason before the warnings.
 
     The program prints the reason last, except for faults of the input, which have no warnings
     before them.
 
     Examples
     --------
-    >>> print(_reason_first(4, "&surface: short waves\\nstep 0: the solver did not converge"))
+    >>> print(_reason_first(4, "&surface: short waves\nstep 0: the solver did not converge"))
     step 0: the solver did not converge
     before: &surface: short waves
     """
