@@ -24,7 +24,7 @@ module case_time
    integer, parameter :: probe = 128                        !! cells along a side of the measured transform
    real(dp), parameter :: seconds_of_a_row = 2.0e-3_dp      !! to move the road, append a row to the file and flush it
    real(dp), parameter :: seconds_to_begin = 0.08_dp
-   real(dp), parameter :: seconds_of_a_cell = 0.6e-6_dp     !! to make the road and to write a snapshot
+   real(dp), parameter :: seconds_of_a_cell = 0.3e-6_dp     !! to make the road and to write a snapshot
 
    !> Transforms of a solve from scratch in periodic and in free mode; of a solve with adhesion; and of its next step.
    real(dp), parameter :: solve_of(2) = [20.0_dp, 40.0_dp], adhesive_solve = 40.0_dp, adhesive_step = 25.0_dp
@@ -93,7 +93,7 @@ contains
 
       seconds = transforms_needed(case)*(1.0_dp + sweeps)*seconds_of_a_transform()/threads* &
          padded*log(max(padded, 2.0_dp))/(real(probe, dp)**2*log(real(probe, dp)**2)) + &
-         seconds_to_begin + seconds_of_a_cell*cells + count_rows(case%phases)*seconds_of_a_row
+         seconds_to_begin + seconds_of_a_cell*cells/threads + count_rows(case%phases)*seconds_of_a_row
    end function seconds_needed
 
    !> Processor time of one transform of `probe` x `probe` cells, s.
