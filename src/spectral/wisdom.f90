@@ -29,6 +29,7 @@ module wisdom
 
    logical :: started = .false.
    logical :: kept = .false.
+   logical :: shared = .false.                       !! the other processes have the wisdom of this one, the first
    character(:), allocatable :: folder
    character(:), allocatable :: fault                !! of a file of wisdom; not allocated if there is none
 
@@ -127,6 +128,7 @@ contains
       character(:), allocatable :: temporary
       logical :: usable
 
+      shared = .false.
       if (.not. (kept .and. is_first_process())) return
       ! `kept` remains true if a file has become unusable since, because the plans of a run must be found in one way.
       call read_wisdom(usable)
@@ -141,12 +143,17 @@ contains
       end if
    end subroutine save_wisdom
 
-   !> Give all processes the wisdom of the first one, so that they use the same plans. Collective.
+   !> Give all processes the wisdom of the first one, so that they use the same plans. Nothing is sent if it has found no
+   !> plan since the last time, because the wisdom of many sizes takes megabytes. Collective.
    subroutine share_wisdom()
       character(:), allocatable :: text
+      logical :: known                         !! to all processes
       integer(c_int) :: status
 
       if (process_count() == 1) return
+      known = shared
+      call share(known)
+      if (known) return
       call share(kept)
       if (is_first_process()) text = taken_text(fftw_export_wisdom_to_string())
       call share(text)
@@ -154,6 +161,7 @@ contains
       if (is_first_process()) text = taken_text(fftwf_export_wisdom_to_string())
       call share(text)
       if (.not. is_first_process()) status = fftwf_import_wisdom_from_string(text//c_null_char)
+      shared = .true.
    end subroutine share_wisdom
 
    !> A text of C, whose memory is then freed.
