@@ -326,8 +326,7 @@ def compound_of(
                   arms_per_decade=arms_per_decade, **(
                       {} if temperature_tolerance is None
                       else {"temperature_tolerance": temperature_tolerance}))
-    return Compound(fit.material, fit.reference, fit.wlf, dict(fit.shifts),
-                    dict(fit.vertical_shifts), fit.valid_range, fit.name, list(fit.notes))
+    return fit.compound()
 
 
 def _refuse(options: Mapping[str, Any], reason: str) -> None:
@@ -380,7 +379,7 @@ def _of_comments(path: Path) -> tuple[tuple[float, float] | None, dict[float, fl
         if range_ and is_number(range_[1]) and is_number(range_[2]):
             found = float(range_[1]), float(range_[2])
         factor = re.match(r"! moduli of the group: times b_T = (\S+) at ", line)
-        if factor and is_number(factor[1]):
+        if factor and is_number(factor[1]) and float(factor[1]) > 0.0:
             rise = float(factor[1])
         kind = re.match(r"! (?:vertical )?shifts \(log10 ([ab]_T)\): ", line)
         if kind:

@@ -144,23 +144,29 @@ class DmaFit:
             ones and there are vertical shifts.
         """
         comment = "".join(f"! {line}\n" for line in self.summary().splitlines())
-        material = self.material
-        if self.wlf and self.vertical_shifts and temperature not in (None, self.reference):
-            rise = self._compound().b_t(number("temperature", temperature))
-            material = Prony(rise * material.g_inf, rise * material.g, material.tau)
-            comment += f"! moduli of the group: times b_T = {rise!r} at {temperature:g} C\n"
         if self.wlf is None:
             if temperature is not None and temperature != self.reference:
                 raise ValueError(
                     f"temperature = {temperature:g}: the data give no WLF constants: give them"
                     " (wlf, --wlf C1 C2)")
-            return comment + material.to_namelist(poisson=poisson)
-        return comment + material.to_namelist(
-            poisson=poisson, wlf=self.wlf,
-            temperature=self.wlf.t_ref if temperature is None else temperature)
+            return comment + self.material.to_namelist(poisson=poisson)
 
-    def _compound(self) -> Compound:
-        """Return the rubber with its shifts."""
+        celsius = self.wlf.t_ref if temperature is None else temperature
+        material = self.material
+        rise = self.compound().b_t(celsius)
+        if rise != 1.0:
+            material = Prony(rise * material.g_inf, rise * material.g, material.tau)
+            comment += f"! moduli of the group: times b_T = {rise!r} at {celsius:g} C\n"
+        return comment + material.to_namelist(
+            poisson=poisson, wlf=self.wlf, temperature=celsius)
+
+    def compound(self) -> Compound:
+        """Return the rubber at all temperatures, with its shifts.
+
+        Returns
+        -------
+        Compound
+        """
         return Compound(self.material, self.reference, self.wlf, dict(self.shifts),
                         dict(self.vertical_shifts), self.valid_range, self.name, list(self.notes))
 

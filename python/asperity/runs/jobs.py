@@ -334,12 +334,12 @@ def _reason_first(status: int, printed: str) -> str:
     --------
     >>> print(_reason_first(4, "&surface: short waves\nstep 0: the solver did not converge"))
     step 0: the solver did not converge
-    before: &surface: short waves
+    warning: &surface: short waves
     """
     *warned, reason = printed.splitlines() or [""]
     if status == 2 or not warned:
         return printed
-    return "\n".join([reason, *(f"before: {line}" for line in warned)])
+    return "\n".join([reason, *(f"warning: {line}" for line in warned)])
 
 
 def is_used(job: Job) -> bool:
