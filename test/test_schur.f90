@@ -492,7 +492,7 @@ contains
       real(dp), allocatable, intent(out) :: direction(:)   !! after the release, on the rest of the contact
       real(dp), allocatable, intent(out), optional :: restored(:)   !! what keeps the load of long waves
       real(dp), dimension(s%grid%nx, s%grid%ny) :: pressure, change, kept
-      real(sp) :: before(s%grid%nx, s%grid%ny)
+      real(sp) :: before(s%grid%nx, s%grid%ny), part(s%grid%nx)
       integer :: j, jb
 
       pressure = reshape(merge(1.0_dp, 0.0_dp, inside), shape(pressure))
@@ -500,9 +500,10 @@ contains
       call s%preconditioner%release(s%coarse, s%active, steps, trial, pressure, before)
       do jb = s%coarse%strips(1), s%coarse%strips(2)
          do j = s%coarse%first_y(jb), s%coarse%first_y(jb + 1) - 1
+            call s%preconditioner%give_coarse_part(s%coarse, jb, part)
             associate (model => s%preconditioner%blocks%pending(s%coarse%block_x(1:s%grid%nx), jb))
                change(:, j) = s%preconditioner%image(1:s%grid%nx, j) + model
-               kept(:, j) = s%preconditioner%correction(s%coarse, jb) - model
+               kept(:, j) = part - model
             end associate
             if (s%preconditioner%length > 0.0_sp) &
                change(:, j) = change(:, j) + s%preconditioner%length*s%preconditioner%response(1:s%grid%nx, j)

@@ -84,18 +84,22 @@ contains
    end subroutine new_active_blocks
 
    !> Deactivate all blocks, and set the work fields to zero.
-   subroutine clear(self, residual, direction, search)
+   subroutine clear(self, residual, direction, search, before)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: residual(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
       real(sp), intent(inout) :: search(self%columns(1) - 1:, self%all_rows(1) - 1:)
+      real(sp), intent(inout), optional :: before(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! another residual
+      logical :: another
       integer :: j
 
-      !$omp parallel do default(none) shared(self, residual, direction, search) private(j) &
+      another = present(before)
+      !$omp parallel do default(none) shared(self, residual, direction, search, before, another) private(j) &
       !$omp num_threads(self%threads)
       do j = self%all_rows(1) - 1, self%all_rows(2) + 1
          residual(:, j) = 0.0_sp
          search(:, j) = 0.0_sp
+         if (another) before(:, j) = 0.0_sp
          if (j >= 1 .and. j <= self%rows) direction(:, j) = 0.0_sp
       end do
       self%live = .false.
@@ -160,35 +164,38 @@ contains
 
    !> List the runs of blocks that have a cell with P > 0 or a gap below the level. Set the work fields to zero in
    !> blocks that are no longer active.
-   subroutine list_runs(self, level, residual, direction)
+   subroutine list_runs(self, level, residual, direction, before)
       class(active_blocks_type), intent(inout) :: self
       real(dp), intent(in) :: level                !! m
       real(sp), intent(inout) :: residual(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
       real(sp), intent(inout) :: direction(:, :)   !! [nx, rows]
+      real(sp), intent(inout), optional :: before(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! another residual
       integer :: b, j, first, last, n
-      logical :: now, before
+      logical :: another, now, joined
 
-      !$omp parallel do default(none) shared(self, level, residual, direction) &
-      !$omp private(b, j, first, last, n, now, before) num_threads(self%threads)
+      another = present(before)
+      !$omp parallel do default(none) shared(self, level, residual, direction, before, another) &
+      !$omp private(b, j, first, last, n, now, joined) num_threads(self%threads)
       do j = 1, self%rows
          n = 0
-         before = .false.
+         joined = .false.
          do b = 1, size(self%least, 1)
             now = self%loaded(b, j) .or. self%least(b, j) < level
             first = (b - 1)*width + 1
             last = min(b*width, self%nx)
             if (now) then
-               if (.not. before) then
+               if (.not. joined) then
                   n = n + 1
                   self%first(n, j) = first
                end if
                self%last(n, j) = last
             else if (self%live(b, j)) then
                residual(first:last, j) = 0.0_sp
+               if (another) before(first:last, j) = 0.0_sp
                direction(first:last, j) = 0.0_sp
             end if
             self%live(b, j) = now
-            before = now
+            joined = now
          end do
          self%runs(j) = n
       end do

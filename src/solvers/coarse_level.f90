@@ -60,6 +60,8 @@ module coarse_level
    contains
       generic :: sum_blocks => sum_blocks_single, sum_blocks_double
       procedure, private :: sum_blocks_single, sum_blocks_double
+      procedure :: add_blocks
+      procedure :: spread_blocks
       procedure :: share_blocks
       procedure :: block_totals
       procedure :: block_sum
@@ -180,22 +182,53 @@ contains
    !> Form the sums over the blocks along x of values in single precision.
    pure subroutine sum_blocks_single(self, column, blocks)
       class(coarse_level_type), intent(in) :: self
-      real(sp), intent(in) :: column(:)        !! sums over the rows of a row of blocks, [columns]
-      real(dp), intent(out) :: blocks(:)       !! [nx]
+      real(sp), contiguous, intent(in) :: column(:)    !! sums over the rows of a row of blocks, [columns]
+      real(dp), contiguous, intent(out) :: blocks(:)   !! [nx]
+
+      blocks(:) = 0.0_dp
+      call self%add_blocks(column, blocks)
+   end subroutine sum_blocks_single
+
+   !> Add the sums over the blocks along x to those of other rows.
+   pure subroutine add_blocks(self, column, blocks)
+      class(coarse_level_type), intent(in) :: self
+      real(sp), contiguous, intent(in) :: column(:)    !! sums over the rows of a row of blocks, [columns]
+      real(dp), contiguous, intent(inout) :: blocks(:) !! [nx]
       integer :: b, first
 
       first = 1
       do b = 1, self%nx
          associate (n => self%sizes_x(b))
             if (n == usual) then
-               blocks(b) = sum_of_block(column(first:first + n - 1))
+               blocks(b) = blocks(b) + sum_of_block(column(first:first + usual - 1))
             else
-               blocks(b) = sum(real(column(first:first + n - 1), dp))
+               blocks(b) = blocks(b) + sum(real(column(first:first + n - 1), dp))
             end if
             first = first + n
          end associate
       end do
-   end subroutine sum_blocks_single
+   end subroutine add_blocks
+
+   !> Give each cell of a row the number of its block.
+   pure subroutine spread_blocks(self, blocks, first, row)
+      class(coarse_level_type), intent(in) :: self
+      real(dp), contiguous, intent(in) :: blocks(:)    !! [nx]
+      integer, intent(in) :: first                     !! column of the first cell
+      real(sp), contiguous, intent(out) :: row(first:)
+      integer :: a, b, i, last
+
+      last = ubound(row, 1)
+      do b = self%block_x(first), self%block_x(last)
+         a = self%first_x(b)
+         if (self%sizes_x(b) == usual .and. a >= first .and. a + usual - 1 <= last) then
+            do i = a, a + usual - 1
+               row(i) = real(blocks(b), sp)
+            end do
+         else
+            row(max(a, first):min(a + self%sizes_x(b) - 1, last)) = real(blocks(b), sp)
+         end if
+      end do
+   end subroutine spread_blocks
 
    !> The sum of a block of the usual size, for which the compiler needs no loop.
    pure function sum_of_block(values) result(total)
@@ -213,8 +246,8 @@ contains
    !> Form the sums over the blocks along x of values in double precision.
    pure subroutine sum_blocks_double(self, column, blocks)
       class(coarse_level_type), intent(in) :: self
-      real(dp), intent(in) :: column(:)
-      real(dp), intent(out) :: blocks(:)
+      real(dp), contiguous, intent(in) :: column(:)
+      real(dp), contiguous, intent(out) :: blocks(:)
       integer :: b, first
 
       first = 1

@@ -156,8 +156,9 @@ contains
          call prepare_problem(problem, self%grid, self%operator%threads, height, task, determined)
          effort = 0.0_dp
          if (determined) call self%start_on_coarse_grid(task, height, pressure, effort, past)
-         call self%work%active%clear(self%work%preconditioner%residual, self%work%direction(:, :, as_formed), &
-            self%work%preconditioner%search)
+         associate (fields => self%work%preconditioner)
+            call self%work%active%clear(fields%residual, self%work%direction(:, :, as_formed), fields%search, fields%before)
+         end associate
          self%work%scale = 0.0_dp
          self%work%offset = 0.0_dp
          call new_gap_watch(watch, self%mixed, task%tolerance)
@@ -196,7 +197,8 @@ contains
          if (outcome%iterations >= problem%max_iterations) now%phase = phase_ended
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
-            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction(:, :, as_formed))
+            call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction(:, :, as_formed), &
+               work%preconditioner%before)
             call work%active%list_wide_runs(work%preconditioner%search)
          end associate
       end subroutine measure_state

@@ -92,7 +92,7 @@ contains
       allocate (correction(self%grid%nx))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
-         correction(:) = self%preconditioner%correction(self%coarse, jb)
+         call self%preconditioner%give_coarse_part(self%coarse, jb, correction)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             response(self%coarse%columns(1):) => self%preconditioner%response_row(j)
             do k = 1, self%active%runs(j)
@@ -130,7 +130,7 @@ contains
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          correction(:) = 0.0_sp
-         if (preconditioned) correction(:) = self%preconditioner%correction(self%coarse, jb)
+         if (preconditioned) call self%preconditioner%give_coarse_part(self%coarse, jb, correction)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             call direction_row(self, preconditioned, beta, j, pressure(:, j), correction, rows(j))
          end do

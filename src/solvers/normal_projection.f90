@@ -78,7 +78,7 @@ contains
       allocate (correction(self%grid%nx))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
-         correction(:) = self%preconditioner%correction(self%coarse, jb)
+         call self%preconditioner%give_coarse_part(self%coarse, jb, correction)
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             response(self%coarse%columns(1):) => self%preconditioner%response_row(j)
             rows(j) = trial_sums_type()
@@ -227,29 +227,32 @@ contains
       type(step_sums_type), intent(out) :: sums
       type(step_sums_type), allocatable :: rows(:)
       real(dp), allocatable :: column(:), step(:)
-      integer :: j, k, jb
+      integer :: j, k, jb, next
 
       allocate (rows(self%grid%rows()))
-      !$omp parallel default(none) shared(self, operator, level, pressure, gap, rows) private(j, k, jb, column, step) &
-      !$omp num_threads(self%threads)
+      !$omp parallel default(none) shared(self, operator, level, pressure, gap, rows) &
+      !$omp private(j, k, jb, next, column, step) num_threads(self%threads)
       allocate (column(self%coarse%columns(1):self%coarse%columns(2)), step(self%grid%nx))
       !$omp do schedule(dynamic)
       do jb = self%coarse%strips(1), self%coarse%strips(2)
          column(:) = 0.0_dp
          do j = self%coarse%first_y(jb), self%coarse%first_y(jb + 1) - 1
             rows(j) = step_sums_type()
-            step(:) = 0.0_dp
-            do k = 1, self%active%runs(j)
-               associate (first => self%active%first(k, j))
-                  call step_cells(self%active%last(k, j) - first + 1, self%trial, level, pressure(first, j), &
-                     gap(first, j), self%direction(first, j, self%tried), step(first), column(first), rows(j))
-               end associate
-            end do
             if (self%active%runs(j) == 0) then
                call operator%forward_zero_row(1, j)
-            else
-               call operator%forward_row(1, j, step)
+               cycle
             end if
+            next = 1
+            do k = 1, self%active%runs(j)
+               associate (first => self%active%first(k, j), last => self%active%last(k, j))
+                  step(next:first - 1) = 0.0_dp
+                  call step_cells(last - first + 1, self%trial, level, pressure(first, j), &
+                     gap(first, j), self%direction(first, j, self%tried), step(first), column(first), rows(j))
+                  next = last + 1
+               end associate
+            end do
+            step(next:) = 0.0_dp
+            call operator%forward_row(1, j, step)
          end do
          call self%coarse%sum_blocks(column, self%coarse%mean(:, jb))
          self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells

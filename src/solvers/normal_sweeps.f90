@@ -38,14 +38,13 @@ contains
       lowered = self%alpha*self%offset + self%shift
    end function lowered
 
-   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere. The residual before is
-   !> kept. Other passes assume that a cell is in S if its residual is not 0, so it must not be 0 there.
-   pure subroutine residual_cells(n, scale, level, pressure, gap, residual, before, column)
+   !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere. Other
+   !> passes assume that a cell is in S if its residual is not 0, so it must not be 0 there.
+   pure subroutine residual_cells(n, scale, level, pressure, gap, residual, column)
       integer, intent(in) :: n
       real(dp), intent(in) :: scale, level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(sp), intent(inout) :: residual(n)
-      real(sp), intent(inout) :: before(n)
       real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
       real(dp), parameter :: least = tiny(1.0_sp)
       real(dp) :: g
@@ -53,7 +52,6 @@ contains
 
       !$omp simd private(g)
       do i = 1, n
-         before(i) = residual(i)
          g = level - gap(i)
          residual(i) = real(positive(max(g, pressure(i)))*sign(max(abs(scale*g), least), g), sp)
          column(i) = column(i) + residual(i)

@@ -24,7 +24,7 @@ module schur_passes
    implicit none
    private
 
-   public :: add_blocks, residual_pass, schur_fields_type, search_pass, step_type
+   public :: residual_pass, schur_fields_type, search_pass, step_type
 
    integer, parameter :: together = 16            !! rows of blocks of a portion, at most
    integer, parameter :: portions_of_thread = 8   !! at least, if there are enough rows of blocks
@@ -42,7 +42,7 @@ module schur_passes
       type(image_sums_type) :: sums                      !! of the residual and its image
       ! Over the columns and rows; the residual and the direction have one more on each side:
       real(sp), allocatable :: residual(:, :)            !! v on S, 0 on N
-      real(sp), allocatable :: before(:, :)              !! the residual of the iteration before, [nx, ny]
+      real(sp), allocatable :: before(:, :)              !! the residual of the iteration before
       real(sp), allocatable :: search(:, :)              !! d, 0 on S
       real(sp), pointer, contiguous :: image(:, :) => null()      !! b
       real(sp), pointer, contiguous :: response(:, :) => null()   !! e of the last step
@@ -50,6 +50,15 @@ module schur_passes
    contains
       procedure :: response_row
    end type schur_fields_type
+
+   !> Numbers for each column of a row of blocks. A thread allocates them once for all its rows of blocks.
+   type :: row_numbers_type
+      real(sp), allocatable :: column(:)                 !! sums over the rows of a block
+      real(sp), allocatable :: count(:)                  !! numbers of cells of N likewise
+      real(sp), allocatable :: added(:)                  !! coarse part that the image lacks
+      real(sp), allocatable :: corrected(:)              !! coarse part of W b
+      real(sp), allocatable :: below(:), above(:)        !! for `row_beside`
+   end type row_numbers_type
 
    !> The numbers of a step that a pass needs.
    type :: step_type
@@ -60,7 +69,7 @@ module schur_passes
 contains
 
    !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, its block means and its image by K. The
-   !> residual before is kept.
+   !> residual before is kept: the two fields change places, which costs no pass.
    subroutine residual_pass(self, coarse, active, scale, level, pressure, gap)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(inout) :: coarse
@@ -69,12 +78,18 @@ contains
       real(dp), intent(in) :: level                      !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
       type(image_sums_type), allocatable :: rows(:)
+      type(row_numbers_type) :: numbers
+      real(sp), allocatable :: oldest(:, :)
       real(dp) :: totals(2)
       integer :: c, jb, strips(2)
 
+      call move_alloc(self%before, oldest)
+      call move_alloc(self%residual, self%before)
+      call move_alloc(oldest, self%residual)
       allocate (rows(self%rows(1):self%rows(2)))
-      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) private(c, jb, strips) &
-      !$omp num_threads(self%threads)
+      !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
+      !$omp private(c, jb, strips, numbers) num_threads(self%threads)
+      call allocate_numbers(self%columns, numbers)
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
          strips = portion(self, coarse, c)
@@ -84,8 +99,8 @@ contains
             self%blocks%image_off(:, jb) = 0.0_dp
             self%blocks%cells_off(:, jb) = 0.0_dp
             self%blocks%far(:, jb) = cells_beyond_rim(coarse, active, jb)
-            call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), rows)
-            if (jb - 1 > strips(1)) call image_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), rows)
+            call image_rows(self, coarse, active, jb, inner_rows(coarse, jb), numbers, rows)
+            if (jb - 1 > strips(1)) call image_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), numbers, rows)
          end do
       end do
       !$omp end do
@@ -96,7 +111,7 @@ contains
       do c = 1, portions(self, coarse)
          strips = portion(self, coarse, c)
          do jb = strips(1), strips(2), max(strips(2) - strips(1), 1)
-            call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), rows)
+            call image_rows(self, coarse, active, jb, edge_rows(coarse, jb), numbers, rows)
          end do
       end do
       !$omp end parallel
@@ -124,7 +139,7 @@ contains
          do k = 1, active%runs(j)
             associate (first => active%first(k, j))
                call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
-                  gap(first, j), self%residual(first, j), self%before(first, j), column(first))
+                  gap(first, j), self%residual(first, j), column(first))
             end associate
          end do
          call close_row(self, self%residual(:, j))
@@ -154,18 +169,19 @@ contains
    end function cells_beyond_rim
 
    !> Compute the image of the residual by K in some rows of a block.
-   subroutine image_rows(self, coarse, active, jb, which, rows)
+   subroutine image_rows(self, coarse, active, jb, which, numbers, rows)
       class(schur_fields_type), intent(inout), target :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb                          !! row of blocks
       integer, intent(in) :: which(3)                    !! first and last row, and their distance
+      type(row_numbers_type), intent(inout) :: numbers
       type(image_sums_type), intent(inout) :: rows(self%rows(1):)
-      real(sp), allocatable :: column(:), count(:)
       real(sp), pointer, contiguous :: centre(:)
       integer :: j, k
 
-      allocate (column(self%columns(1):self%columns(2)), count(self%columns(1):self%columns(2)), source=0.0_sp)
+      numbers%column(:) = 0.0_sp
+      numbers%count(:) = 0.0_sp
       centre(self%columns(1):) => self%centre(:, coarse%first_y(jb + 1) - coarse%first_y(jb))
       do j = which(1), which(2), which(3)
          rows(j) = image_sums_type()
@@ -173,13 +189,24 @@ contains
             associate (first => active%wide_first(k, jb))
                call image_cells(active%wide_last(k, jb) - first + 1, centre(first:), self%weights, &
                   self%residual(first, j - 1), self%residual(first - 1, j), self%residual(first, j + 1), &
-                  self%image(first:, j), column(first), count(first), rows(j))
+                  self%image(first:, j), numbers%column(first), numbers%count(first), rows(j))
             end associate
          end do
       end do
-      call add_blocks(coarse, column, self%blocks%image_off(:, jb))
-      call add_blocks(coarse, count, self%blocks%cells_off(:, jb))
+      call coarse%add_blocks(numbers%column, self%blocks%image_off(:, jb))
+      call coarse%add_blocks(numbers%count, self%blocks%cells_off(:, jb))
    end subroutine image_rows
+
+   !> Allocate the numbers for each column of a row of blocks.
+   pure subroutine allocate_numbers(columns, numbers)
+      integer, intent(in) :: columns(2)                  !! first and last column, with the margin
+      type(row_numbers_type), intent(out) :: numbers
+
+      associate (a => columns(1), b => columns(2))
+         allocate (numbers%column(a:b), numbers%count(a:b), numbers%added(a:b), numbers%corrected(a:b))
+         allocate (numbers%below(a:b), numbers%above(a:b))
+      end associate
+   end subroutine allocate_numbers
 
    !> Do the pass of a step: add the step before to the image, and form the direction and its response.
    subroutine search_pass(self, coarse, active, step, sums)
@@ -189,21 +216,23 @@ contains
       type(step_type), intent(in) :: step
       type(response_sums_type), intent(out) :: sums
       type(response_sums_type), allocatable :: rows(:)
+      type(row_numbers_type) :: numbers
       real(dp) :: totals(3)
       integer :: c, jb, strips(2)
 
       allocate (rows(self%rows(1):self%rows(2)))
-      !$omp parallel default(none) shared(self, coarse, active, step, rows) private(c, jb, strips) &
+      !$omp parallel default(none) shared(self, coarse, active, step, rows) private(c, jb, strips, numbers) &
       !$omp num_threads(self%threads)
+      call allocate_numbers(self%columns, numbers)
       !$omp do schedule(dynamic)
       do c = 1, portions(self, coarse)
          strips = portion(self, coarse, c)
          do jb = strips(1), strips(2)
             self%blocks%response_off(:, jb) = 0.0_dp
-            call search_rows(self, coarse, active, jb, step)
-            call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, rows)
+            call search_rows(self, coarse, active, jb, step, numbers)
+            call response_rows(self, coarse, active, jb, inner_rows(coarse, jb), step%last, numbers, rows)
             if (jb - 1 > strips(1)) &
-               call response_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), step%last, rows)
+               call response_rows(self, coarse, active, jb - 1, edge_rows(coarse, jb - 1), step%last, numbers, rows)
          end do
       end do
       !$omp end do
@@ -214,7 +243,7 @@ contains
       do c = 1, portions(self, coarse)
          strips = portion(self, coarse, c)
          do jb = strips(1), strips(2), max(strips(2) - strips(1), 1)
-            call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, rows)
+            call response_rows(self, coarse, active, jb, edge_rows(coarse, jb), step%last, numbers, rows)
          end do
       end do
       !$omp end parallel
@@ -224,29 +253,28 @@ contains
    end subroutine search_pass
 
    !> Compute the image and the search direction in the rows of a block.
-   subroutine search_rows(self, coarse, active, jb, step)
+   subroutine search_rows(self, coarse, active, jb, step, numbers)
       class(schur_fields_type), intent(inout) :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb
       type(step_type), intent(in) :: step
-      real(sp), allocatable :: added(:), corrected(:)
+      type(row_numbers_type), intent(inout) :: numbers
       integer :: j, k, n
 
       if (active%wide_runs(jb) == 0) return
-      allocate (added(self%columns(1):self%columns(2)), corrected(self%columns(1):self%columns(2)))
-      added(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
-      corrected(:) = real(self%blocks%correction(coarse%block_x, jb), sp)
+      call coarse%spread_blocks(self%blocks%pending(:, jb), self%columns(1), numbers%added)
+      call coarse%spread_blocks(self%blocks%correction(:, jb), self%columns(1), numbers%corrected)
       do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
                n = active%wide_last(k, jb) - first + 1
                if (step%first) then
-                  call start_search_cells(n, real(om, sp), added(first), corrected(first), &
+                  call start_search_cells(n, real(om, sp), numbers%added(first), numbers%corrected(first), &
                      self%residual(first, j), self%image(first:, j), self%search(first, j))
                else
-                  call search_cells(n, real(om, sp), self%length, step%beta, added(first), &
-                     corrected(first), self%response(first:, j), self%image(first:, j), self%search(first, j))
+                  call search_cells(n, real(om, sp), self%length, step%beta, numbers%added(first), &
+                     numbers%corrected(first), self%response(first:, j), self%image(first:, j), self%search(first, j))
                end if
             end associate
          end do
@@ -255,24 +283,24 @@ contains
    end subroutine search_rows
 
    !> Compute the response to the search direction in some rows of a block.
-   subroutine response_rows(self, coarse, active, jb, which, last, rows)
+   subroutine response_rows(self, coarse, active, jb, which, last, numbers, rows)
       class(schur_fields_type), intent(inout), target :: self
       type(coarse_level_type), intent(in) :: coarse
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb
       integer, intent(in) :: which(3)                    !! first and last row, and their distance
       logical, intent(in) :: last
+      type(row_numbers_type), intent(inout), target :: numbers
       type(response_sums_type), intent(inout) :: rows(self%rows(1):)
-      real(sp), allocatable, target :: column(:), below(:), above(:)
       real(sp), pointer, contiguous :: centre(:), south(:), north(:)
       integer :: j, k, n
 
       if (active%wide_runs(jb) == 0) return
-      allocate (column(self%columns(1):self%columns(2)), source=0.0_sp)
+      numbers%column(:) = 0.0_sp
       centre(self%columns(1):) => self%centre(:, coarse%first_y(jb + 1) - coarse%first_y(jb))
       do j = which(1), which(2), which(3)
-         south(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j - 1], below)
-         north(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j + 1], above)
+         south(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j - 1], numbers%below)
+         north(self%columns(1):) => row_beside(self, coarse, active, jb, [j, j + 1], numbers%above)
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
                n = active%wide_last(k, jb) - first + 1
@@ -281,12 +309,12 @@ contains
                      self%search(first - 1, j), north(first:), self%response(first:, j), rows(j))
                else
                   call response_cells(n, centre(first:), self%weights, south(first:), self%search(first - 1, j), north(first:), &
-                     self%image(first:, j), self%response(first:, j), column(first), rows(j))
+                     self%image(first:, j), self%response(first:, j), numbers%column(first), rows(j))
                end if
             end associate
          end do
       end do
-      if (.not. last) call add_blocks(coarse, column, self%blocks%response_off(:, jb))
+      if (.not. last) call coarse%add_blocks(numbers%column, self%blocks%response_off(:, jb))
    end subroutine response_rows
 
    !> The row of the search direction beside one of a row of blocks. Where it lies beyond the rim, it has the values of the
@@ -297,7 +325,7 @@ contains
       type(active_blocks_type), intent(in) :: active
       integer, intent(in) :: jb                          !! row of blocks
       integer, intent(in) :: j(2)                        !! the row and the one beside it
-      real(sp), allocatable, intent(inout), target :: edge(:)   !! may be used for the result
+      real(sp), contiguous, intent(inout), target :: edge(:)   !! may be used for the result
       real(sp), pointer, contiguous :: row(:)
       integer :: beside
 
@@ -308,7 +336,6 @@ contains
       if (beside < 1 .or. beside > coarse%ny) return     ! beyond the margin, where the search direction is 0
       if (active%same_runs(jb, beside)) return
 
-      if (.not. allocated(edge)) allocate (edge(self%columns(1):self%columns(2)))
       call join_rows(active, jb, beside, self%search(self%columns(1):self%columns(2), j(1)), row, self%columns(1), edge)
       row => edge
    end function row_beside
@@ -394,17 +421,6 @@ contains
       parts = portions(self, coarse)
       strips = coarse%all_strips(1) + [(c - 1)*count/parts, c*count/parts - 1]
    end function portion
-
-   !> Add sums over the blocks along x.
-   pure subroutine add_blocks(coarse, column, blocks)
-      type(coarse_level_type), intent(in) :: coarse
-      real(sp), intent(in) :: column(:)
-      real(dp), intent(inout) :: blocks(:)
-      real(dp) :: more(size(blocks))
-
-      call coarse%sum_blocks(column, more)
-      blocks = blocks + more
-   end subroutine add_blocks
 
    !> The row j of e, of which b lacks the multiple `length`. Where the length is 0, e is not set and may hold any
    !> numbers; its factor 0 then meets the row of b instead.

@@ -77,7 +77,7 @@ module schur_preconditioner
       procedure :: set_residual
       procedure :: extend
       procedure :: release
-      procedure :: correction
+      procedure :: give_coarse_part
       procedure :: transforms
       procedure :: destroy
    end type schur_preconditioner_type
@@ -110,9 +110,10 @@ contains
       self%weights = real([wx, wy], sp)
       call set_centre(self, coarse, 2.0_dp*(wx + wy))
       ! They take no memory before `clear` of module `active_blocks` sets them to zero, with the threads that use them.
-      allocate (self%residual(self%columns(1) - 1:self%columns(2) + 1, self%rows(1) - 1:self%rows(2) + 1))
-      if (.not. self%by_waves) allocate (self%before(grid%nx, grid%rows()))
-      allocate (self%search(self%columns(1) - 1:self%columns(2) + 1, self%rows(1) - 1:self%rows(2) + 1))
+      associate (left => self%columns(1) - 1, right => self%columns(2) + 1, low => self%rows(1) - 1, high => self%rows(2) + 1)
+         allocate (self%residual(left:right, low:high), self%search(left:right, low:high))
+         if (.not. self%by_waves) allocate (self%before(left:right, low:high))
+      end associate
       extents = [self%columns(2) - self%columns(1), self%rows(2) - self%rows(1)] + 1
       if (product(int(extents, int64)) <= length) then
          call c_f_pointer(memory, pair, [extents, 2])
@@ -253,18 +254,17 @@ contains
       end do
    end subroutine minimise
 
-   !> The coarse part of M r, or of the change after a release, along a row of blocks.
-   pure function correction(self, coarse, jb) result(row)
+   !> Give the coarse part of M r, or of the change after a release, along a row of blocks.
+   pure subroutine give_coarse_part(self, coarse, jb, row)
       class(schur_preconditioner_type), intent(in) :: self
       type(coarse_level_type), intent(in) :: coarse
       integer, intent(in) :: jb                          !! row of blocks
-      real(sp) :: row(self%grid%nx)
+      real(sp), intent(out) :: row(self%grid%nx)         !! of each cell
 
-      associate (block_x => coarse%block_x(1:self%grid%nx))
-         row = real(self%blocks%pending(block_x, jb), sp)
-         if (self%released .and. self%long_waves%matter) row = row + real(self%long_waves%restored(block_x, jb), sp)
-      end associate
-   end function correction
+      call coarse%spread_blocks(self%blocks%pending(:, jb), 1, row)
+      if (self%released .and. self%long_waves%matter) &
+         row(:) = row + real(self%long_waves%restored(coarse%block_x(1:self%grid%nx), jb), sp)
+   end subroutine give_coarse_part
 
    !> Transforms done so far, in units of a transform of the whole grid.
    pure function transforms(self) result(count)

@@ -14,7 +14,7 @@ module schur_release
    use coarse_level, only : coarse_level_type
    use field_sums, only : row_total
    use normal_sweeps, only : trial_type
-   use schur_passes, only : add_blocks, schur_fields_type
+   use schur_passes, only : schur_fields_type
    implicit none
    private
 
@@ -44,7 +44,7 @@ contains
       allocate (correction(self%columns(1):self%columns(2)))
       !$omp do schedule(dynamic)
       do jb = coarse%all_strips(1), coarse%all_strips(2)
-         correction(:) = real(self%blocks%pending(coarse%block_x, jb), sp)
+         call coarse%spread_blocks(self%blocks%pending(:, jb), self%columns(1), correction)
          column(:) = 0.0_sp
          count(:) = 0.0_sp
          do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
@@ -66,8 +66,8 @@ contains
          end do
          self%blocks%image_off(:, jb) = 0.0_dp
          self%blocks%cells_off(:, jb) = 0.0_dp
-         call add_blocks(coarse, column, self%blocks%image_off(:, jb))
-         call add_blocks(coarse, count, self%blocks%cells_off(:, jb))
+         call coarse%add_blocks(column, self%blocks%image_off(:, jb))
+         call coarse%add_blocks(count, self%blocks%cells_off(:, jb))
       end do
       !$omp end parallel
       call coarse%share_blocks(self%blocks%image_off)
