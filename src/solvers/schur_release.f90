@@ -124,17 +124,18 @@ contains
       real(sp), intent(inout) :: count(n)           !! numbers of cells in N likewise
       real(dp), intent(inout) :: squares            !! sum of the squares of the image on N
       real(dp) :: per_alpha
-      real(sp) :: b, value, off, acts, released, square
+      real(sp) :: offset, b, value, off, acts, released, square
       integer :: i
 
       per_alpha = 1.0_dp/trial%alpha
+      offset = real(trial%offset, sp)
       square = 0.0_sp
       !$omp simd reduction(+:square) private(b, value, off, acts, released)
       do i = 1, n
          b = image(i) + length*response(i) + correction(i)
          off = 1.0_sp - not_zero(residual(i))
          acts = not_zero(direction(i))
-         value = acts*real(per_alpha*pressure(i) + (direction(i) - trial%offset), sp) + (1.0_sp - acts)*b
+         value = acts*(real(per_alpha*pressure(i), sp) + (direction(i) - offset)) + (1.0_sp - acts)*b
          released = (1.0_sp - off)*(0.5_sp - sign(0.5_sp, value))
          b = off*b + released*value
          residual(i) = (1.0_sp - released)*residual(i)
