@@ -197,7 +197,7 @@ contains
          if (outcome%iterations >= problem%max_iterations) now%phase = phase_ended
          associate (work => self%work)
             if (work%scale <= 0.0_dp) work%scale = unit_of(measure%duality_gap, task%rms_height)
-            work%per_pressure = work%preconditioner%compliance*work%scale/task%modulus
+            work%preconditioner%per_pressure = work%preconditioner%compliance*work%scale/task%modulus
             call work%active%list_runs(measure%level, work%preconditioner%residual, work%direction(:, :, as_formed), &
                work%preconditioner%before)
             call work%active%list_wide_runs(work%preconditioner%search)

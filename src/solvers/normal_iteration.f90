@@ -226,7 +226,7 @@ contains
       if (work%preconditioner%released) work%offset = work%offset + work%trial%shift/alpha
       ! The step may be many orders larger than the present load, which may be round-off at the first touch.
       call product%set_unit(max(measure%load, trial%above)/work%grid%cells())
-      call project_step(work, product, measure%level, pressure, gap, sums)
+      call project_step(work, product, .not. is_releasing(now), measure%level, pressure, gap, sums)
       if (sums%slope > 0.0_dp) then
          call choose_length(work, product, task%modulus, pressure, clipped, sums, now)
       else

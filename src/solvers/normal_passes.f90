@@ -35,7 +35,6 @@ module normal_passes
       type(active_blocks_type) :: active             !! where residual, direction and step are not 0
       type(schur_preconditioner_type) :: preconditioner   !! holds the residual
       real(dp) :: scale = 0.0_dp                     !! of the residual and the direction; 0: not chosen yet
-      real(dp) :: per_pressure = 1.0_dp              !! direction that changes the pressure by 1 Pa in a step, about
       real(sp), allocatable :: direction(:, :, :)    !! [nx, rows, as formed and, for very oblong cells, lowered]
       integer :: tried = as_formed                   !! the direction of the trial pressure: as formed, or lowered
       real(dp) :: offset = 0.0_dp                    !! to be subtracted from the direction where it acts
@@ -219,8 +218,8 @@ contains
       do k = 1, self%active%runs(j)
          associate (a => self%active%first(k, j), b => self%active%last(k, j))
             call direction_cells(b - a + 1, length, image(a:b), response(a:b), correction(a:b), &
-               self%preconditioner%residual(a:b, j), real(beta, sp), real(self%offset, sp), self%per_pressure, &
-               pressure(a:b), self%direction(a:b, j, as_formed), sums)
+               self%preconditioner%residual(a:b, j), real(beta, sp), real(self%offset, sp), &
+               self%preconditioner%per_pressure, pressure(a:b), self%direction(a:b, j, as_formed), sums)
          end associate
       end do
    end subroutine direction_row

@@ -10,8 +10,8 @@ module normal_projection
    use field_sums, only : least_of_rows
    use normal_passes, only : as_formed, lowered, normal_work_type
    use normal_sums, only : step_sums_type, total, trial_sums_type
-   use normal_sweeps, only : changed_trial_cells, form_trial_cells, longest_cells, lower_cells, step_cells, trial_cells, &
-      trial_type
+   use normal_sweeps, only : changed_trial_cells, form_trial_cells, longest_cells, lower_cells, spread_step_cells, &
+      step_cells, trial_cells, trial_type
    implicit none
    private
 
@@ -218,10 +218,11 @@ contains
       if (abs(kept - load) > 1e-13_dp*load) self%trial%factor = load/kept
    end subroutine find_clip
 
-   !> Compute the projected step, its sums and block means. Each row is transformed as soon as it is formed.
-   subroutine project_step(self, operator, level, pressure, gap, sums)
+   !> Compute the projected step and its sums. Each row is transformed as soon as it is formed.
+   subroutine project_step(self, operator, predicts, level, pressure, gap, sums)
       type(normal_work_type), intent(inout) :: self
       type(convolution_type), intent(inout) :: operator
+      logical, intent(in) :: predicts                !! its block means and the sum of its square are needed
       real(dp), intent(in) :: level                  !! m
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
       type(step_sums_type), intent(out) :: sums
@@ -230,7 +231,7 @@ contains
       integer :: j, k, jb, next
 
       allocate (rows(self%grid%rows()))
-      !$omp parallel default(none) shared(self, operator, level, pressure, gap, rows) &
+      !$omp parallel default(none) shared(self, operator, predicts, level, pressure, gap, rows) &
       !$omp private(j, k, jb, next, column, step) num_threads(self%threads)
       allocate (column(self%coarse%columns(1):self%coarse%columns(2)), step(self%grid%nx))
       !$omp do schedule(dynamic)
@@ -247,18 +248,20 @@ contains
                associate (first => self%active%first(k, j), last => self%active%last(k, j))
                   step(next:first - 1) = 0.0_dp
                   call step_cells(last - first + 1, self%trial, level, pressure(first, j), &
-                     gap(first, j), self%direction(first, j, self%tried), step(first), column(first), rows(j))
+                     gap(first, j), self%direction(first, j, self%tried), step(first), rows(j))
+                  if (predicts) call spread_step_cells(last - first + 1, step(first), column(first), rows(j)%square)
                   next = last + 1
                end associate
             end do
             step(next:) = 0.0_dp
             call operator%forward_row(1, j, step)
          end do
+         if (.not. predicts) cycle
          call self%coarse%sum_blocks(column, self%coarse%mean(:, jb))
          self%coarse%mean(:, jb) = self%coarse%mean(:, jb)/self%coarse%cells
       end do
       !$omp end parallel
-      call self%coarse%share_blocks(self%coarse%mean)
+      if (predicts) call self%coarse%share_blocks(self%coarse%mean)
       sums = total(rows)
    end subroutine project_step
 

@@ -13,7 +13,8 @@ module normal_sweeps
    private
 
    public :: changed_trial_cells, count_acting_cells, count_cells_below, direction_cells, form_trial_cells, load_cells, &
-      longest_cells, lower_cells, measure_cells, overlap_cells, residual_cells, spread_cells, step_cells, trial_cells, trial_type
+      longest_cells, lower_cells, measure_cells, overlap_cells, residual_cells, spread_cells, spread_step_cells, step_cells, &
+      trial_cells, trial_type
 
    !> A trial pressure and its projection on the admissible pressures, which give the step
    !>     s = factor max(P + alpha (d - offset) - shift, 0) - P
@@ -40,20 +41,22 @@ contains
 
    !> Compute the residual scale (level - gap) on S = {P > 0 or gap < level}, and zero elsewhere. Other
    !> passes assume that a cell is in S if its residual is not 0, so it must not be 0 there.
-   pure subroutine residual_cells(n, scale, level, pressure, gap, residual, column)
+   pure subroutine residual_cells(n, scale, level, per_pressure, pressure, gap, residual, column)
       integer, intent(in) :: n
       real(dp), intent(in) :: scale, level
+      real(dp), intent(in) :: per_pressure          !! makes a pressure a number about as large as a residual
       real(dp), intent(in) :: pressure(n), gap(n)
       real(sp), intent(inout) :: residual(n)
       real(sp), intent(inout) :: column(n)          !! sums over the rows of a block
-      real(dp), parameter :: least = tiny(1.0_sp)
-      real(dp) :: g
+      real(sp), parameter :: least = tiny(1.0_sp)
+      real(sp) :: r, inside
       integer :: i
 
-      !$omp simd private(g)
+      !$omp simd private(r, inside)
       do i = 1, n
-         g = level - gap(i)
-         residual(i) = real(positive(max(g, pressure(i)))*sign(max(abs(scale*g), least), g), sp)
+         r = real(scale*(level - gap(i)), sp)
+         inside = positive_single(max(r, real(per_pressure*pressure(i), sp)))
+         residual(i) = inside*sign(max(abs(r), least), r)
          column(i) = column(i) + residual(i)
       end do
    end subroutine residual_cells
@@ -236,35 +239,48 @@ contains
       sums%least = lowest
    end subroutine changed_trial_cells
 
-   !> Compute the projected step and its sums.
-   pure subroutine step_cells(n, trial, level, pressure, gap, direction, step, column, sums)
+   !> Compute the projected step, and its product with the residual.
+   pure subroutine step_cells(n, trial, level, pressure, gap, direction, step, sums)
       integer, intent(in) :: n
       type(trial_type), intent(in) :: trial
       real(dp), intent(in) :: level
       real(dp), intent(in) :: pressure(n), gap(n)
       real(sp), intent(in) :: direction(n)
       real(dp), intent(inout) :: step(n)
-      real(dp), intent(inout) :: column(n)          !! sums over the rows of a block
       type(step_sums_type), intent(inout) :: sums
-      real(dp) :: alpha, lowered, factor, product, square, s
+      real(dp) :: alpha, lowered, factor, product, s
       integer :: i
 
       alpha = trial%alpha
       lowered = trial%lowered()
       factor = trial%factor
       product = 0.0_dp
-      square = 0.0_dp
-      !$omp simd reduction(+:product, square) private(s)
+      !$omp simd reduction(+:product) private(s)
       do i = 1, n
          s = factor*max(trial_of(alpha, lowered, pressure(i), direction(i)), 0.0_dp) - pressure(i)
          step(i) = s
-         column(i) = column(i) + s
          product = product + (level - gap(i))*s
-         square = square + s**2
       end do
       sums%slope = sums%slope + product
-      sums%square = sums%square + square
    end subroutine step_cells
+
+   !> Add the step to the sums over the rows of a block, and its square to a sum.
+   pure subroutine spread_step_cells(n, step, column, square)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: step(n)
+      real(dp), intent(inout) :: column(n)
+      real(dp), intent(inout) :: square
+      real(dp) :: total
+      integer :: i
+
+      total = 0.0_dp
+      !$omp simd reduction(+:total)
+      do i = 1, n
+         column(i) = column(i) + step(i)
+         total = total + step(i)**2
+      end do
+      square = square + total
+   end subroutine spread_step_cells
 
    !> Compute below = direction - shift where the direction acts. It must not become 0 there.
    pure subroutine lower_cells(n, shift, direction, below)

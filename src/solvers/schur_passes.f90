@@ -38,6 +38,7 @@ module schur_passes
       integer :: threads = 1
       real(sp) :: weights(2) = 0.0_sp                    !! of the stencil, along x and y
       real(sp), allocatable :: centre(:, :)              !! in its middle, (columns, numbers of rows of a block)
+      real(dp) :: per_pressure = 1.0_dp                  !! makes a pressure a number about as large as a residual
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       type(image_sums_type) :: sums                      !! of the residual and its image
       ! Over the columns and rows; the residual and the direction have one more on each side:
@@ -138,7 +139,7 @@ contains
       do j = coarse%first_y(jb), coarse%first_y(jb + 1) - 1
          do k = 1, active%runs(j)
             associate (first => active%first(k, j))
-               call residual_cells(active%last(k, j) - first + 1, scale, level, pressure(first, j), &
+               call residual_cells(active%last(k, j) - first + 1, scale, level, self%per_pressure, pressure(first, j), &
                   gap(first, j), self%residual(first, j), column(first))
             end associate
          end do
