@@ -54,6 +54,7 @@ module coarse_level
       type(row_sharing_type) :: sharing            !! of the rows of blocks where the level is divided
       integer, allocatable :: first_y(:)           !! first row of a block among those of this process, [ny + 1]
       real(dp), allocatable :: mean(:, :)          !! block means, (nx, held(1):held(2))
+      logical, private :: even = .false.           !! all blocks have the usual number of columns
       logical, private :: copied = .false.         !! all processes hold the sums of all blocks
       real(dp), private :: fine_symbol = 0.0_dp    !! symbol of A for waves of the size of a block
       type(convolution_type), private :: normal
@@ -140,6 +141,7 @@ contains
          self%first_x(self%block_x(i)) = i
          self%sizes_x(self%block_x(i)) = self%sizes_x(self%block_x(i)) + 1
       end do
+      self%even = all(self%sizes_x == usual)
    end subroutine divide_columns
 
    !> Divide the rows into blocks, and the rows of blocks among the processes. The margin belongs to the processes that hold
@@ -196,14 +198,14 @@ contains
       real(dp), contiguous, intent(inout) :: blocks(:) !! [nx]
       integer :: b, first
 
+      if (self%even) then
+         call add_even_blocks(self%nx, column, blocks)
+         return
+      end if
       first = 1
       do b = 1, self%nx
          associate (n => self%sizes_x(b))
-            if (n == usual) then
-               blocks(b) = blocks(b) + sum_of_block(column(first:first + usual - 1))
-            else
-               blocks(b) = blocks(b) + sum(real(column(first:first + n - 1), dp))
-            end if
+            blocks(b) = blocks(b) + sum(real(column(first:first + n - 1), dp))
             first = first + n
          end associate
       end do
@@ -215,33 +217,42 @@ contains
       real(dp), contiguous, intent(in) :: blocks(:)    !! [nx]
       integer, intent(in) :: first                     !! column of the first cell
       real(sp), contiguous, intent(out) :: row(first:)
-      integer :: a, b, i, last
-
-      last = ubound(row, 1)
-      do b = self%block_x(first), self%block_x(last)
-         a = self%first_x(b)
-         if (self%sizes_x(b) == usual .and. a >= first .and. a + usual - 1 <= last) then
-            do i = a, a + usual - 1
-               row(i) = real(blocks(b), sp)
-            end do
-         else
-            row(max(a, first):min(a + self%sizes_x(b) - 1, last)) = real(blocks(b), sp)
-         end if
-      end do
-   end subroutine spread_blocks
-
-   !> The sum of a block of the usual size, for which the compiler needs no loop.
-   pure function sum_of_block(values) result(total)
-      real(sp), intent(in) :: values(usual)
-      real(dp) :: total
       integer :: i
 
-      total = 0.0_dp
-      !$omp simd reduction(+:total)
-      do i = 1, usual
-         total = total + values(i)
+      if (self%even .and. size(row) == usual*self%nx) then
+         call spread_even_blocks(self%nx, blocks, row)
+      else
+         row(:) = [(real(blocks(self%block_x(i)), sp), i=first, ubound(row, 1))]
+      end if
+   end subroutine spread_blocks
+
+   !> Give each cell of a row of blocks of the usual size the number of its block.
+   pure subroutine spread_even_blocks(n, blocks, row)
+      integer, intent(in) :: n
+      real(dp), intent(in) :: blocks(n)
+      real(sp), intent(out) :: row(usual, n)
+      integer :: b
+
+      do b = 1, n
+         row(:, b) = real(blocks(b), sp)
       end do
-   end function sum_of_block
+   end subroutine spread_even_blocks
+
+   !> Add the sums over blocks of the usual size. The additions are written out, because the compiler then forms the sums of
+   !> several blocks at once.
+   pure subroutine add_even_blocks(n, column, blocks)
+      integer, intent(in) :: n
+      real(sp), intent(in) :: column(usual, n)
+      real(dp), intent(inout) :: blocks(n)
+      integer :: b
+
+      !$omp simd
+      do b = 1, n
+         blocks(b) = blocks(b) &
+            + (((real(column(1, b), dp) + column(5, b)) + (real(column(3, b), dp) + column(7, b))) &
+            + ((real(column(2, b), dp) + column(6, b)) + (real(column(4, b), dp) + column(8, b))))
+      end do
+   end subroutine add_even_blocks
 
    !> Form the sums over the blocks along x of values in double precision.
    pure subroutine sum_blocks_double(self, column, blocks)
