@@ -103,7 +103,7 @@ contains
             command%quiet = .true.
          case ('--reference')
             command%reference = .true.
-         case ('--output')
+         case ('--output', '-o')
             if (allocated(command%output)) call refuse('--output is given twice')
             call take_value(command%output)
          case ('--threads')
@@ -274,7 +274,7 @@ contains
             '                     [--time-limit H:M:S] [--quiet]'//nl//nl// &
             'Run a case. The result is an HDF5 file, by default next to the input. To draw it:'//nl// &
             'asperity plot RESULT.h5'//nl//nl// &
-            '  --output FILE.h5  write the result to this file'//nl// &
+            '  --output FILE.h5  write the result to this file; -o for short'//nl// &
             '  --threads N       use N threads; the default is OMP_NUM_THREADS, SLURM_CPUS_PER_TASK,'//nl// &
             '                    or all processors'//nl// &
             '  --restart         continue from the last checkpoint of the result'//nl// &

@@ -4,7 +4,7 @@ program main
    use case_files, only : default_result, refuse_overwriting
    use case_input, only : read_case
    use case_run, only : run_type
-   use case_report, only : case_summary, resolved_input
+   use case_report, only : check_report
    use case_settings, only : case_type, path_length
    use case_templates, only : all_template_names, find_template, template_is_available, template_list, &
       template_text
@@ -24,7 +24,7 @@ program main
    use result_target, only : check_place
    use asperity_signals, only : catch_signals, checkpoint_asked, end_with_parent, forget_checkpoint, stop_signal, &
       stop_signal_name
-   use standard_streams, only : say, say_error
+   use standard_streams, only : say, say_error, say_warnings
    use asperity_surface, only : check_files
    use linked_libraries, only : linked_versions
    use text_tools, only : add_line, in_one_line, nearest_name, to_text
@@ -121,7 +121,7 @@ contains
          call refuse_overwriting(case, error)
          if (.not. allocated(error)) call check_files(case%grid, case%surfaces, error)
          call warn_of_place(case)
-         if (.not. allocated(error)) call say(resolved_input(case)//case_summary(case), error)
+         if (.not. allocated(error)) call say(check_report(case), error)
       end if
       call agree(error)
    end subroutine check
@@ -159,7 +159,7 @@ contains
       if (command%threads > 0) case%solver%threads = command%threads
       call catch_signals()
       call end_with_parent()
-      if (case%warnings /= '' .and. is_first_process()) call say_error(case%warnings)
+      if (case%warnings /= '' .and. is_first_process()) call say_warnings(case%warnings)
       call run_steps(case, error)
    end subroutine run
 
@@ -267,7 +267,7 @@ contains
 
       if (len(run%warnings) == 0) return
       call progress%finish()
-      if (is_first_process()) call say_error(run%warnings)
+      if (is_first_process()) call say_warnings(run%warnings)
       run%warnings = ''
    end subroutine print_warnings
 

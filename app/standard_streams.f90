@@ -7,7 +7,7 @@ module standard_streams
    implicit none
    private
 
-   public :: say, say_error
+   public :: say, say_error, say_warnings
 
 contains
 
@@ -28,6 +28,19 @@ contains
 
       call write_all(2_c_int, text//new_line('a'), written)
    end subroutine say_error
+
+   !> Write warnings to standard error, each of which begins with the word, so that nobody takes it for an error.
+   subroutine say_warnings(lines)
+      character(*), intent(in) :: lines                        !! one per line, without the last line end
+      integer :: first, last
+
+      first = 1
+      do while (first <= len(lines))
+         last = first + index(lines(first:)//new_line('a'), new_line('a')) - 2
+         call say_error('warning: '//lines(first:last))
+         first = last + 2
+      end do
+   end subroutine say_warnings
 
    !> Write a text completely, in as many calls as that takes.
    subroutine write_all(descriptor, text, written)

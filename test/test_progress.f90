@@ -33,13 +33,15 @@ contains
       row%friction = 0.5_dp
       row%iterations_normal = 12
       row%iterations_tangential = 7
-      call check_that(progress_line(row, 101, 0, 2.0_dp) == 'step 9/100  time 1.250E-02 s  '// &
+      call check_that(progress_line(row, 101, 0, 2.0_dp, .false.) == 'step 9/100  time 1.250E-02 s  '// &
          'area 0.2500  friction  0.5000  iterations 12+7  5.0 steps/s  18 s left', 'a line')
-      call check_order(index(progress_line(row, 101, 5, 50.0_dp), '10.0 s/step  15 min 10 s left'), '>', 0, &
+      call check_that(progress_line(row, 101, 0, 2.0_dp, .true.) == 'step 9/100  1.250E-02 s  '// &
+         'area 0.2500  friction  0.5000  18 s left', 'a line of a terminal')
+      call check_order(index(progress_line(row, 101, 5, 50.0_dp, .false.), '10.0 s/step  15 min 10 s left'), '>', 0, &
          'a slow run that is continued')
       row%step = 100
-      call check_that(index(progress_line(row, 101, 0, 2.0_dp), 'left') == 0, 'the last step')
-      call check_that(index(progress_line(row, 101, 0, 0.0_dp), 'step 100/100') == 1, 'no time yet')
+      call check_that(index(progress_line(row, 101, 0, 2.0_dp, .true.), 'left') == 0, 'the last step')
+      call check_that(index(progress_line(row, 101, 0, 0.0_dp, .false.), 'step 100/100') == 1, 'no time yet')
    end subroutine texts_of_progress
 
 end module test_progress

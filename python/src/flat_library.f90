@@ -7,7 +7,7 @@ module flat_library
    use asperity_surface, only : check_files
    use asperity_version, only : version_number
    use case_input, only : parse_case
-   use case_report, only : case_summary, resolved_input
+   use case_report, only : check_report
    use case_settings, only : case_type
    use flat_answers, only : put_text, report
    use input_listing, only : input_table, list_values
@@ -103,7 +103,7 @@ contains
       length = 0
       call parse_case(text, path, case, error)
       if (.not. allocated(error) .and. files == 1) call check_files(case%grid, case%surfaces, error)
-      if (.not. allocated(error)) call put_text(resolved_input(case)//case_summary(case), buffer, length)
+      if (.not. allocated(error)) call put_text(check_report(case), buffer, length)
       call report(error, status, message)
    end subroutine input_check
 

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import PATIENCE, frictional_result, write_result
+from viscoelastic_case import wait_for_rows
 
 import asperity
 from asperity.__main__ import main
@@ -139,6 +140,25 @@ def test_a_run_that_was_killed_or_stopped(tmp_path, monkeypatch):
     assert ("no new row for 1 min 0 s where a row takes up to 0.25 s: perhaps no longer running"
             in silent)
     assert "stopped after step 5" in stopped and len(looks) == 4
+
+
+LONG = """&grid nx = 32, ny = 32, lx = 1e-3 /
+&surface shape = 'sine', amplitude = 1e-6, wavelength = 0.5e-3 /
+&material shear_modulus = 1e6, prony_g = 1e6, prony_tau = 1e-3 /
+&phase pressure = 1e3 /
+&phase duration = 1e3, steps = 1000000, velocity_x = 0.01 /
+"""
+
+
+def test_the_view_of_a_killed_run_ends(program, tmp_path):
+    """On the machine of the run, the lock that nobody holds shows that its process has ended."""
+    (tmp_path / "case.nml").write_text(LONG)
+    with subprocess.Popen([program, "run", "case.nml", "--quiet"], cwd=tmp_path) as run:
+        wait_for_rows(run, tmp_path / "case.h5", 3)
+        run.kill()
+    out = io.StringIO()
+    assert watch(tmp_path / "case.h5", every=0.05, stream=out) == 0
+    assert "its process has ended" in out.getvalue()
 
 
 def test_command(result, tmp_path, capsys):

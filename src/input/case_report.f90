@@ -2,6 +2,7 @@
 module case_report
    use adhesion_advice, only : adhesion_notes
    use asperity_parallel, only : process_count, processes_of_machine
+   use case_files, only : default_result
    use footprint_advice, only : footprint_note
    use case_settings, only : case_type, phase_settings_type
    use case_time, only : duration_text, seconds_needed
@@ -16,7 +17,7 @@ module case_report
    implicit none
    private
 
-   public :: case_summary, control_units, resolved_input
+   public :: check_report, control_units, resolved_input
 
    character(*), parameter :: nl = new_line('a')
 
@@ -51,6 +52,25 @@ contains
       end do
       text = text//solver_text(case)
    end function resolved_input
+
+   !> What `asperity check` prints: the resolved input and a summary, as an input for other runs. A name of the result that
+   !> follows from that of the input is only a comment: a copy of the input with another name must not replace the result of
+   !> this one.
+   function check_report(case) result(text)
+      type(case_type), intent(in) :: case
+      character(:), allocatable :: text
+      character(:), allocatable :: named
+      integer :: at
+
+      text = resolved_input(case)
+      if (case%output%file == default_result(case%path)) then
+         named = '&output'//nl//string('file', case%output%file)
+         at = index(text, named, back=.true.)
+         text = text(:at - 1)//'&output'//nl//'  ! file = '//in_quotes(trim(case%output%file))// &
+            ', after the name of the input'//nl//text(at + len(named):)
+      end if
+      text = text//case_summary(case)
+   end function check_report
 
    !> The steps, the memory, the size of the result, the effect of adhesion and the warnings as comment lines.
    function case_summary(case) result(text)

@@ -10,11 +10,19 @@ module input_values
    use namelist_file, only : assignment_type, namelists_type, scan_namelists, shown_tokens
    use namelist_tokens, only : token_broken, token_comma, token_string, token_type, token_word, &
       tokenise
-   use text_tools, only : nearest_name, to_text
+   use text_tools, only : lower, nearest_name, to_text
    implicit none
    private
 
    public :: default_group, read_groups
+
+   !> Names that other programs and books use, each with ours.
+   character(16), parameter :: other_names(2, 7) = reshape([character(16) :: 'mu', 'coefficient', 'nu', 'poisson', &
+      'load', 'pressure', 'speed', 'velocity_x', 'velocity', 'velocity_x', 'time', 'duration', &
+      'work_of_adhesion', 'energy'], [2, 7])
+   !> Names of the modulus in tension.
+   character(15), parameter :: names_of_tension(5) = [character(15) :: 'e', 'e_modulus', 'elastic_modulus', &
+      'young_modulus', 'youngs_modulus']
 
 contains
 
@@ -338,9 +346,22 @@ contains
 
       if (any([(ichar(name(i:i)) > 126, i=1, len(name))])) then
          text = ': it contains a character that is not ASCII, such as a non-breaking space'
-      else
-         text = hint('', nearest_name(name, names))
+         return
       end if
+      if (any(names_of_tension == lower(name)) .and. any(names == 'shear_modulus')) then
+         text = '; give shear_modulus = E/(2 (1 + poisson))'
+         return
+      end if
+      do i = 1, size(other_names, 2)
+         text = hint('', trim(other_names(2, i)))
+         if (lower(name) == other_names(1, i) .and. any(names == other_names(2, i))) return
+      end do
+      text = hint('', nearest_name(name, names))
+      if (text == '') text = '; there are '//trim(names(1))
+      if (index(text, '; there are') /= 1) return
+      do i = 2, size(names)
+         text = text//', '//trim(names(i))
+      end do
    end function advice_on_name
 
    !> The proposal of a similar name, if there is one.

@@ -1,11 +1,12 @@
-!> The progress of a run. On a terminal it is one line that is overwritten, elsewhere a line is
-!> printed from time to time.
+!> The progress of a run. On a terminal it is one line that is overwritten, and that fits in 80 columns: a longer one
+!> would begin a new line each time. Elsewhere a line with more numbers is printed from time to time.
 module asperity_progress
    use, intrinsic :: iso_fortran_env, only : error_unit
    use file_system, only : is_terminal
    use history_row, only : history_row_type
    use asperity_precision, only : dp, int64
    use rising_clock, only : seconds_now
+   use text_tools, only : to_text
    implicit none
    private
 
@@ -85,7 +86,7 @@ contains
       character(:), allocatable :: line
       integer :: length, unread
 
-      line = progress_line(self%row, self%rows, self%first_step, now - self%started)
+      line = progress_line(self%row, self%rows, self%first_step, now - self%started, short=self%terminal)
       length = len(line)
       if (self%terminal) then
          line = char(13)//line//repeat(' ', max(0, self%shown_length - length))
@@ -100,20 +101,24 @@ contains
    end subroutine show
 
    !> The line of progress for a row.
-   pure function progress_line(row, rows, first_step, elapsed) result(line)
+   pure function progress_line(row, rows, first_step, elapsed, short) result(line)
       type(history_row_type), intent(in) :: row
       integer, intent(in) :: rows           !! rows of the history when it is complete
       integer, intent(in) :: first_step     !! the first row of this run
       real(dp), intent(in) :: elapsed       !! time since the start of this run, s
+      logical, intent(in) :: short          !! for a terminal, without iterations and rate
       character(:), allocatable :: line
+      character(:), allocatable :: time_mark
       character(120) :: text
       real(dp) :: rate
       integer :: done
 
-      write (text, '("step ", i0, "/", i0, "  time ", es9.3, " s  area ", f6.4, "  friction ", '// &
-         'f7.4, "  iterations ", i0, "+", i0)') row%step, max(rows - 1, row%step), row%time, &
-         row%contact_area, row%friction, row%iterations_normal, row%iterations_tangential
+      time_mark = '  time '
+      if (short) time_mark = '  '
+      write (text, '("step ", i0, "/", i0, a, es9.3, " s  area ", f6.4, "  friction ", f7.4)') row%step, &
+         max(rows - 1, row%step), time_mark, row%time, row%contact_area, row%friction
       line = trim(text)
+      if (.not. short) line = line//'  iterations '//to_text(row%iterations_normal)//'+'//to_text(row%iterations_tangential)
       done = row%step - first_step + 1
       if (elapsed <= 0.0_dp .or. done < 1) return
       rate = done/elapsed
@@ -122,7 +127,7 @@ contains
       else
          write (text, '(f0.1, " s/step")') 1.0_dp/rate
       end if
-      line = line//'  '//trim(text)
+      if (.not. short) line = line//'  '//trim(text)
       if (row%step < rows - 1) line = line//'  '//duration_text((rows - 1 - row%step)/rate)//' left'
    end function progress_line
 

@@ -222,6 +222,8 @@ contains
       first = 1
       if (index(message, trim(term%file)//': ') == 1) first = len_trim(term%file) + 3
       fault = trim(term%place)//': file = '''//trim(term%file)//''': '//message(first:)
+      if (index(message, 'is not an HDF5 file') > 0) fault = fault//'; `asperity import` makes one of a map in another format'
+      if (index(message, 'there is no dataset') > 0) fault = fault//'; `dataset` names the one with the heights'
       if (term%line > 0) then
          write (line, '(a, i0, a)') ' (line ', term%line, ')'
          fault = fault//trim(line)

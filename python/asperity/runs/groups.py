@@ -96,6 +96,9 @@ class Group(MutableMapping[str, Any]):
         """Return the description of a variable."""
         variable = self._entry.variables.get(name) if isinstance(name, str) else None
         if variable is None:
+            if str(name).lower().startswith("young") and self._entry.name == "material":
+                raise UnknownVariableError(f"&material: no variable is named {name!r}: give"
+                                           " shear_modulus = E/(2 (1 + poisson))")
             raise UnknownVariableError(f"&{self._entry.name}: " + unknown_name(
                 "variable", name, self._entry.variables))
         return variable

@@ -26,8 +26,8 @@ from .case import Case
 from .progress import SweepProgress
 
 __all__ = ["PAUSE", "UNSUITABLE", "Job", "Stops", "begins_again", "environment", "found_result",
-           "is_done", "is_used", "may_continue", "new_ends", "run_here", "take_end", "text_of",
-           "write_input"]
+           "is_done", "is_used", "may_continue", "new_ends", "record_end", "run_here", "take_end",
+           "text_of", "write_input"]
 
 _map_checksum = call("map_checksum")
 
@@ -315,31 +315,42 @@ def _finish(job: Job) -> bool:
     status = job.process.returncode
     if job.restarted and begins_again(status, printed):
         return True
-    job.status = status
-    if status:
-        reason = _reason_first(status, printed) or f"the program ended with status {status}"
-        job.message = f"killed by signal {-status}" if status < 0 else reason
-    elif printed:
-        job.message = printed
+    record_end(job, status, printed)
     return False
 
 
-def _reason_first(status: int, printed: str) -> str:
+def record_end(job: Job, status: int, printed: str) -> None:
+    """Set the status of a job, and its message: the reason of a failure, or the warnings.
+
+    Parameters
+    ----------
+    job : Job
+    status : int
+        Exit status of the program; -N if signal N has killed it.
+    printed : str
+        What it has printed on stderr.
+    """
+    job.status = status
+    if status < 0:
+        job.message = f"killed by signal {-status}"
+    elif status:
+        job.message = _reason_first(printed) or f"the program ended with status {status}"
+    else:
+        job.message = "\n".join(line.removeprefix("warning: ") for line in printed.splitlines())
+
+
+def _reason_first(printed: str) -> str:
     r"""Return what a failed program has printed, with the reason before the warnings.
 
-    The program prints the reason last, except for faults of the input, which have no warnings
-    before them.
+    The program prints its warnings first.
 
     Examples
     --------
-    >>> print(_reason_first(4, "&surface: short waves\nstep 0: the solver did not converge"))
+    >>> print(_reason_first("warning: &surface: short waves\nstep 0: the solver did not converge"))
     step 0: the solver did not converge
     warning: &surface: short waves
     """
-    *warned, reason = printed.splitlines() or [""]
-    if status == 2 or not warned:
-        return printed
-    return "\n".join([reason, *(f"warning: {line}" for line in warned)])
+    return "\n".join(sorted(printed.splitlines(), key=lambda line: line.startswith("warning: ")))
 
 
 def is_used(job: Job) -> bool:

@@ -246,9 +246,7 @@ def _take(job: Job, future: Future[tuple[int, str]]) -> None:
     if error is not None:
         job.status, job.message = 1, f"the worker failed: {type(error).__name__}: {error}"
         return
-    job.status, job.message = future.result()
-    if job.status and not job.message:
-        job.message = f"the program ended with status {job.status}"
+    record_end(job, *future.result())
 
 
 # ---- Slurm -----------------------------------------------------------------------------------

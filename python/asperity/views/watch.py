@@ -183,7 +183,10 @@ def picture(run: Run, pace: Pace, width: int, unicode: bool = True) -> list[str]
 
 def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = False,
           stream: TextIO | None = None) -> int:
-    """Follow a run until it ends: it finishes, is stopped, or fails to converge.
+    """Follow a run until it ends: it finishes, is stopped, fails to converge, or is killed.
+
+    A killed run does not record its end. It is noticed on the machine of the run only, where the
+    lock beside the result is free; elsewhere the view goes on.
 
     Parameters
     ----------
@@ -235,8 +238,12 @@ def watch(path: str | os.PathLike[str], *, every: float = 1.0, once: bool = Fals
             out.flush()
             if run.finished or once or run.outcome != "running":
                 return 0
-            time.sleep(every)
+            process_has_ended = held(run) is False
+            if not process_has_ended:
+                time.sleep(every)
             run.refresh()
+            if process_has_ended and not run.finished and run.outcome == "running":
+                return 0  # it was killed, as the view says
     except KeyboardInterrupt:
         # Only the view ends. The run is another process and continues.
         out.write("\n" if live else "")
