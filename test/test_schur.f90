@@ -603,11 +603,11 @@ contains
       allocate (direction(s%grid%nx, s%grid%ny), out(s%grid%nx, s%grid%ny))
       pressure(:, :) = reshape(merge(1.0_dp, 0.0_dp, inside), shape(gap))
       gap(:, :) = reshape(merge(-r, 1.0_dp, inside), shape(gap))
-      call s%active%clear(s%preconditioner%residual, direction, s%preconditioner%search)
+      call s%active%clear(s%preconditioner%residual, direction, s%preconditioner%search, s%preconditioner%before)
       do j = 1, s%grid%ny
          call s%active%survey_row(.true., j, pressure(:, j), gap(:, j), least)
       end do
-      call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction)
+      call s%active%list_runs(0.0_dp, s%preconditioner%residual, direction, s%preconditioner%before)
       call s%active%list_wide_runs(s%preconditioner%search)
       call s%preconditioner%set_residual(s%coarse, s%active, 1.0_dp, 0.0_dp, pressure, gap)
       call s%preconditioner%extend(s%coarse, s%active, steps, form)

@@ -73,6 +73,35 @@ def test_the_program_needs_no_text_relocations(program):
     assert "TEXTREL" not in done.stdout
 
 
+def test_a_copy_of_the_output_does_not_replace_the_result(program, folder):
+    """The name of the result that follows from that of the input is only a comment."""
+    done = check(program, folder, GOOD)
+    assert "! file = " in done.out and "\n  file = " not in done.out
+    (folder / "copy.nml").write_text(done.out)
+    assert call(program, "run", "copy.nml", "--quiet", cwd=folder).returncode == 0
+    assert (folder / "copy.h5").exists()
+    done = check(program, folder, GOOD + "&output file = 'mine.h5' /\n")
+    assert "\n  file = 'mine.h5'" in done.out
+
+
+@pytest.mark.parametrize(("wrong", "hint"), [
+    ("&material youngs_modulus = 3e6", "give shear_modulus = E/(2 (1 + poisson))"),
+    ("&friction law = 'coulomb', mu = 0.5 /\n&material shear_modulus = 1e6",
+     "did you mean coefficient?"),
+    ("&material shear_modulus = 1e6, zzz = 1", "there are poisson, shear_modulus, "),
+])
+def test_hints_for_names_of_other_programs(program, folder, wrong, hint):
+    done = check(program, folder, re.sub("&material shear_modulus = [^ ,/]*", wrong, GOOD))
+    assert done.returncode == 2 and hint in done.err, done.err
+
+
+def test_warnings_of_a_run_begin_with_the_word(program, folder):
+    (folder / "few.nml").write_text(GOOD.replace("&phase", "&adhesion energy = 1e3, range = 1e-9,"
+                                                 " potential = 'exponential' /\n&phase"))
+    done = call(program, "run", "few.nml", "--quiet", cwd=folder)
+    assert "warning: &adhesion: cells of" in done.err
+
+
 def test_a_folder_that_does_not_exist_is_reported(program, folder):
     """The folder may still be made before the run, so that this is a warning."""
     done = check(program, folder, GOOD + "&output file = 'nowhere/a.h5' /\n")
@@ -83,17 +112,17 @@ def test_a_folder_that_does_not_exist_is_reported(program, folder):
 @pytest.mark.parametrize(("phase", "law", "printed"), [
     ("", "", ""),
     ("duration = 1, velocity_x = 1e-4", "", ""),
-    ("steady = .true., velocity_x = 1e-4", "", "If a steady row converges slowly, the pressures of"
-     " all cells are solved for at once. This takes up to"),
+    ("steady = .true., velocity_x = 1e-4", "", "A steady row that converges slowly is solved in"
+     " all cells at once, which takes up to"),
     ("duration = 1, velocity_x = 1e-4", "&friction law = 'coulomb', coefficient = 0.3 /",
-     "Pressure and friction of a row are solved for in turn. If that settles slowly, both are"
-     " solved for together, in all cells at once. This takes up to"),
+     "A row whose pressure and friction settle slowly is solved in all cells at once, which takes"
+     " up to"),
 ])
 def test_memory_of_rows_that_are_solved_at_once(program, folder, phase, law, printed):
     """`check` says what is solved at once, how much memory this takes, and what is lost without."""
     done = check(program, folder, GOOD.replace("1e5 /", f"1e5, {phase} /") + law + "\n")
     assert done.returncode == 0, done.err
-    lines = [line for line in done.out.splitlines() if "takes up to" in line and "at once" in line]
+    lines = [line for line in done.out.splitlines() if "at once, which takes up to" in line]
     assert len(lines) == (1 if printed else 0)
     if printed:
         assert lines[0].startswith(f"! {printed}")

@@ -83,6 +83,14 @@ def test_the_plan_doubts_values_in_another_unit(options, note):
     assert not any(re.match(note, one) for one in small_plan().notes)
 
 
+def test_the_plan_doubts_a_steep_road():
+    for slope, doubted in ((0.3, False), (9.0, True)):
+        road = ROAD.replace("rms_slope=0.15", f"rms_slope={slope}")
+        notes = plan_curve(road_of([road], cells=32), COMPOUND, speeds=[1e-2], pressures=[2e5],
+                           patches=2).notes
+        assert any("the rms slope of the road is" in note for note in notes) == doubted
+
+
 def test_a_fitted_namelist_keeps_the_measured_range(tmp_path):
     """The notes on unmeasured frequencies and temperatures used to come with tables only."""
     omega = np.geomspace(1.0, 1e3, 16)

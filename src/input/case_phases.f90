@@ -287,7 +287,8 @@ contains
       if (grid%nx == 0) return
       cells = cells_per_step(phase, grid)
       if (phase%dt_reason == one_cell .and. abs(cells - 1.0_dp) < 1.0e-3_dp) return
-      if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)//' cells per step'
+      if (cells > 0.0_dp) phase%dt_reason = trim(phase%dt_reason)//', '//to_text(cells)// &
+         trim(merge(' cell ', ' cells', to_text(cells) == '1'))//' per step'
    end subroutine resolve_steps
 
    !> Distance by which a step moves the road, in cells.

@@ -17,7 +17,7 @@ module case_report
    implicit none
    private
 
-   public :: check_report, control_units, resolved_input
+   public :: case_summary, check_report, control_units, resolved_input
 
    character(*), parameter :: nl = new_line('a')
 
@@ -120,12 +120,11 @@ contains
       text = ''
       if (.not. joint_memory(case) > 0.0_dp) return
       if (case%friction%law == 'none') then
-         text = '! If a steady row converges slowly, the pressures of all cells are solved for at once. This'
+         text = '! A steady row that converges slowly'
       else
-         text = '! Pressure and friction of a row are solved for in turn. If that settles slowly, both are solved '// &
-            'for together, in all cells at once. This'
+         text = '! A row whose pressure and friction settle slowly'
       end if
-      text = text//' takes up to '//memory_text(joint_memory(case))//' more, depending on how many cells touch. '// &
+      text = text//' is solved in all cells at once, which takes up to '//memory_text(joint_memory(case))//' more. '// &
          'Without this memory the run continues, but such a row may not converge, which ends the run with status 4'//nl
    end function joint_note
 

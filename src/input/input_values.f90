@@ -140,8 +140,7 @@ contains
 
       associate (value => group%values(at))
          if (value%given .and. .not. (assignment%subscripted .and. is_array(value%entry))) then
-            call group%group_fault(trim(assignment%name)//' is given twice, in line '// &
-               to_text(value%line)//' and in line '//to_text(assignment%line), faults)
+            call group%group_fault(trim(assignment%name)//' is given twice'//lines_of(value%line, assignment%line), faults)
             return
          end if
          if (.not. value%given) then
@@ -337,6 +336,15 @@ contains
          end associate
       end do
    end subroutine finish_group
+
+   !> `, in line 3 and in line 5`, or `, in line 3`.
+   pure function lines_of(one, other) result(text)
+      integer, intent(in) :: one, other
+      character(:), allocatable :: text
+
+      text = ', in line '//to_text(one)
+      if (other /= one) text = text//' and in line '//to_text(other)
+   end function lines_of
 
    !> What may be wrong with a name that is not known. A non-breaking space, for example, cannot be seen.
    function advice_on_name(name, names) result(text)

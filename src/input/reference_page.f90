@@ -22,7 +22,7 @@ contains
       allocate (variables, source=variable_entries())
       text = '# Input reference'//nl//nl// &
          'An input file consists of Fortran namelists in any order; all numbers are in SI units.'//nl// &
-         'Defaults in parentheses are derived, or there is none. In an interval a parenthesis excludes'//nl// &
+         'A default in parentheses is computed from other settings, or there is none. In an interval a parenthesis excludes'//nl// &
          'the end and a bracket includes it. `asperity template --reference` prints this page.'//nl//nl
       do i = 1, size(groups)
          text = text//'## `&'//trim(groups(i)%name)//'`'//nl//nl//trim(groups(i)%meaning)

@@ -75,9 +75,9 @@ contains
       ! The cells are counted in whole tenths, so that they are fewer than needed in the message, too; the factor is
       ! rounded up.
       message = start//tenths(patches%across - 0.05_dp)//' cells across on average: below '// &
-         tenths(patches%needed)//' '//consequence//'; use cells at most 1/'// &
+         tenths(patches%needed)//' '//consequence//'; use at least '// &
          tenths(patches%needed/patches%across + 0.05_dp)// &
-         ' as wide for the same road, if need be on a smaller map around the contact'
+         ' times as many cells per length on the same road; a smaller map around the contact saves memory'
    end function size_warning
 
    !> Convert a number to a text with one decimal place.

@@ -7,11 +7,15 @@ module row_account
    use field_sums, only : row_totals
    use history_row, only : history_row_type
    use outside_balance, only : book_outside
+   use prony, only : instantaneous_modulus
    use solver_result, only : solver_result_type
    implicit none
    private
 
    public :: account, found_step_type
+
+   !> Largest pressure that counts as round-off, over the modulus.
+   real(dp), parameter :: round_off = 1e-20_dp
 
    !> The outcome of solving a step.
    type :: found_step_type
@@ -61,7 +65,7 @@ contains
       call fill_powers(contact, plan, row)
       if (plan%steady) call fill_steady(contact, found, row, force)
       row%friction = 0.0_dp
-      if (abs(row%force) > 0.0_dp .and. any(abs(contact%state%direction) > 0.0_dp)) &
+      if (is_loaded(contact, row%pressure) .and. any(abs(contact%state%direction) > 0.0_dp)) &
          row%friction = dot_product(force, contact%state%direction)/row%force
       call fill_solution(contact, found, row)
       call book_outside(contact%state%row, contact%state%drive_force, force, inertia, &
@@ -116,15 +120,24 @@ contains
       row%force = row%pressure*contact%grid%area()
       row%displacement = contact%state%level + contact%summit
       row%contact_area = sums%touching/cells
-      row%mean_gap = sums%gap/cells
+      row%mean_gap = max(sums%gap, 0.0_dp)/cells    ! it may be slightly negative, by the round-off of the level
       row%road_x = plan%road(1)
       row%road_y = plan%road(2)
       row%sliding_speed = 0.0_dp                    ! without friction the surface does not move along the road
       if (plan%dt > 0.0_dp) row%sliding_speed = dot_product(contact%state%velocity, contact%state%direction)
       row%friction_viscous = 0.0_dp
-      if (abs(sums%pressure) > 0.0_dp) row%friction_viscous = &
+      if (is_loaded(contact, row%pressure)) row%friction_viscous = &
          dot_product(sums%force, contact%state%direction)/(sums%pressure*contact%grid%cell_area())
    end subroutine fill_contact
+
+   !> Is there a load, to which a horizontal force can be compared? Where adhesive surfaces have separated at a given
+   !> displacement, the pressure that is left is round-off.
+   pure logical function is_loaded(contact, pressure)
+      class(contact_type), intent(in) :: contact
+      real(dp), intent(in) :: pressure                 !! mean, Pa
+
+      is_loaded = abs(pressure) > round_off*instantaneous_modulus(contact%material%g_e, contact%material%g)
+   end function is_loaded
 
    !> Fill in the works and energies of the normal side.
    subroutine fill_energies(contact, row)

@@ -7,7 +7,7 @@ import os
 import re
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["INPUT", "MAP", "MATERIAL", "PICTURE", "RESULT", "SHIFTS", "SHIFTS_HEAD",
            "STATE", "WEB_PAGE", "check_folder", "check_output", "kind_of", "make_folder",
-           "new_file", "sealed", "write_text"]
+           "new_file", "sealed", "size_text", "write_text"]
 
 #: Kinds of file that the package and the program write, in the words of messages.
 INPUT = "an input"
@@ -209,7 +209,14 @@ def new_file(path: Path) -> Iterator[Path]:
         raise OSError(f"{path}: cannot be written: {reason}") from None
     finally:
         if temporary:
-            new.unlink(missing_ok=True)
+            with suppress(OSError):  # where nothing can be written, nothing can be removed
+                new.unlink(missing_ok=True)
+
+
+def size_text(path: Path) -> str:
+    """Return the size of a file in kB or MB."""
+    size = path.stat().st_size
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
 
 
 def write_text(path: Path, text: str, encoding: str = "utf-8") -> None:

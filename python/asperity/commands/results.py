@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.files import size_text
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -108,7 +110,7 @@ def _film(run: Any, chosen: argparse.Namespace) -> int:
     if chosen.show:
         chosen.error("--show does not go with --film")
     output = film(run, chosen.output or run.path.with_suffix(".gif"), chosen.film or None)
-    print(f"wrote {output} ({output.stat().st_size / 1e6:.1f} MB)")
+    print(f"wrote {output} ({size_text(output)})")
     return 0
 
 
@@ -132,7 +134,7 @@ def _report(chosen: argparse.Namespace) -> int:
     from ..views.report import write_report
 
     path = write_report(open_result(chosen.result), chosen.output)
-    print(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
+    print(f"wrote {path} ({size_text(path)})")
     return 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..base import library
 from ..base.check import choice, exactly_one, number, positive, stresses_of, whole
 from ..base.errors import NotConverged
+from ..base.notices import warn_user
 from .normal import FloatArray, NormalContact, warn_of_few_cells
 
 __all__ = ["AdhesiveNormalContact", "solve_adhesive"]
@@ -30,7 +30,7 @@ class AdhesiveNormalContact(NormalContact):
     `pressure` includes the attraction. ``pressure - adhesive_pressure`` is the pressure of the
     wall, which is zero where the gap is open. The contact area counts the cells whose gap is zero.
     The residual is the largest absolute value of min(gap/range, G range/energy), where G is the
-    pressure of the wall.
+    pressure of the wall. For a function, G is divided by its largest attraction instead.
 
     Attributes
     ----------
@@ -121,8 +121,9 @@ def solve_adhesive(
     ValueError
         If an argument is not allowed.
     NotConverged
-        If the tolerance is not reached, or if the surfaces separate under a pull that no contact
-        can hold (the reason is then 'detached'). Its ``result`` is the last state.
+        If the tolerance is not reached, or if the surfaces separate under the pull (the reason is
+        then 'detached'). From another start they may hold: closed contact bears a larger pull than
+        surfaces that only touch. Its ``result`` is the last state.
     KeyboardInterrupt
         If Ctrl-C ends the solver.
     MemoryError
@@ -241,10 +242,8 @@ def _look_at_cells(shape: tuple[int, int], lx: float, ly: float, modulus: float,
     else:
         limit, formula = 0.7 * modulus * reach**2 / energy, "0.7 modulus range^2/energy"
     if cell > limit:
-        warnings.warn(
-            f"cells of {cell:.4g} m are larger than {formula} ="
-            f" {limit:.4g} m: the edge of the contact sticks to the grid",
-            UserWarning, stacklevel=3)
+        warn_user(f"cells of {cell:.4g} m are larger than {formula} = {limit:.4g} m: the edge of"
+                  " the contact sticks to the grid")
 
 
 def _start_from(start: str | AdhesiveNormalContact, shape: tuple[int, ...], top: float,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import library
 from ..base.check import choice, exactly_one, number, positive, whole
 from ..base.errors import NotConverged
+from ..base.notices import warn_user
 from ..base.presenters import present
 
 __all__ = ["NormalContact", "solve_normal"]
@@ -204,4 +204,4 @@ def warn_of_few_cells(pressure: FloatArray, gap: FloatArray, lx: float, ly: floa
     (warning,) = _width(pressure.T, gap.T, lx, ly, free, int(adhesive))
     text = warning.decode().strip()
     if text:
-        warnings.warn(text, UserWarning, stacklevel=3)
+        warn_user(text)

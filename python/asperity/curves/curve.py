@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.check import positive, whole
 from ..base.names import unknown_name
+from ..base.notices import warn_user
 from ..results.friction_curve import FrictionCurve
 from ..roads.measured import load
 from ..runs.means import Means, means_of
@@ -155,7 +155,7 @@ def friction_curve(
                       slope_effect=slope_effect, angle=angle, tolerance=tolerance)
     curve = run_curve(plan, folder, means, error=error, extend=extend, quiet=quiet)
     for line in curve.warnings:
-        warnings.warn(line, UserWarning, stacklevel=2)
+        warn_user(line)
     return curve.to_xarray()
 
 

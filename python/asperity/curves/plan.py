@@ -42,6 +42,7 @@ _LARGEST_COEFFICIENT = 1000.0  # that of steady phases
 # warns of its runs above 10 E*, which is 40 G if the rubber is incompressible.
 _MOST_PRESSURE, _LEAST_PRESSURE = 40.0, 1e-5
 _MOST_SPEED = 100.0     # m/s, far above the speed of shear waves in rubber
+_STEEP = 3.0            # rms slope far beyond what a theory for small slopes describes
 _WEDGING = 0.4          # coefficient times rms slope from which a road may wedge the rubber
 _COMMAND_MEMORY = 130e6  # bytes, for the command itself
 
@@ -358,7 +359,7 @@ def _temperature_note(compound: Compound, temperature: FloatArray) -> list[str]:
 
 
 def _load_notes(plan: CurvePlan) -> list[str]:
-    """Return notes on pressures, speeds and coefficients that are often in another unit."""
+    """Return notes on pressures, speeds, slopes and coefficients that may be in another unit."""
     modulus, notes = plan.compound.series.g_inf, []
     if plan.pressure[-1] > _MOST_PRESSURE * modulus:
         notes.append(f"a pressure of {plan.pressure[-1]:g} Pa is {plan.pressure[-1] / modulus:.3g}"
@@ -371,7 +372,12 @@ def _load_notes(plan: CurvePlan) -> list[str]:
     if plan.speed[-1] > _MOST_SPEED:
         notes.append(f"at {plan.speed[-1]:g} m/s the inertia of the rubber counts, which the model"
                      " leaves out: speeds must be far below those of its waves, tens of m/s")
-    wedging = plan.coefficient * _rms_slope(plan.road.patch(0)) if plan.slope_effect else 0.0
+    slope = _rms_slope(plan.road.patch(0))
+    if slope > _STEEP:
+        notes.append(f"the rms slope of the road is {slope:.3g}, but the solid is linear and its"
+                     " surface flat, which holds for small slopes only: are its heights or its"
+                     " sides in another unit?")
+    wedging = plan.coefficient * slope if plan.slope_effect else 0.0
     if wedging > _WEDGING:
         notes.append(f"the coefficient times the rms slope of the road is {wedging:.2g}: above"
                      f" about {_WEDGING:g} parts of the contact are so steep that friction holds"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 import zlib
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..base.check import shown
 from ..base.names import NamedValues, OpenValues, UnknownNameError
+from ..base.notices import warn_user
 from .history import Grid, History
 from .reading import NotAResultError, attributes_of, read_file, scalar_of, text_of
 
@@ -140,9 +140,8 @@ class ResultFile:
         wrong = [row for row in range(rows) if zlib.crc32(table[row].data) != sums[row]]
         if wrong:
             listed = ", ".join(map(str, wrong[:5])) + (", ..." if len(wrong) > 5 else "")
-            warnings.warn(f"{self.path}: the history does not agree with its checksums: the file"
-                          f" is damaged in row{'s' * (len(wrong) > 1)} {listed}", UserWarning,
-                          stacklevel=2)
+            warn_user(f"{self.path}: the history does not agree with its checksums: the file is"
+                      f" damaged in row{'s' * (len(wrong) > 1)} {listed}")
         return bool(wrong)
 
     @property

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+from ..base.notices import warn_user
 from ..base.presenters import present
 from .derived import headline_columns
 from .result_file import ResultFile
@@ -119,7 +119,7 @@ class Run(ResultFile):
         """
         found = steady_mean(self, column)
         if found.note:
-            warnings.warn(f"{self.path}: {column}: {found.note}", UserWarning, stacklevel=2)
+            warn_user(f"{self.path}: {column}: {found.note}")
         return found
 
     @overload

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base import library
 from ..base.check import choice, exactly_one, number, positive, whole
+from ..base.notices import warn_user
 
 __all__ = ["self_affine", "shape"]
 
@@ -128,7 +127,7 @@ def _warn(shape: tuple[int, ...], lx: float, ly: float | None, longest: float | 
     (found,) = _doubts(nx, ny, lx, ly, longest if beyond else min(lx, ly) / 4.0, shortest)
     for line in found.decode().split("\n"):
         if "Nyquist" in line or "wavelength_long" in line:
-            warnings.warn(line.strip().removeprefix("&surface: "), UserWarning, stacklevel=3)
+            warn_user(line.strip().removeprefix("&surface: "))
 
 
 def shape(

@@ -28,6 +28,7 @@ from .jobs import (
     is_used,
     may_continue,
     new_ends,
+    record_end,
     run_here,
     write_input,
 )

@@ -161,13 +161,13 @@ def _do_rows(handle: int, span: tuple[int, int], notes: bytes, result: bytes, st
     view: RunView | None = None
     progress = None if quiet else RunProgress(rows)
     try:
-        warn_of(notes, level=4)
+        warn_of(notes)
         while not finished and not stops.asked:
             try:
                 finished, step, time, area, friction, notes = _step(handle, stops.numbers)
             except Exception as error:  # the row is incomplete, so that no checkpoint is written
                 return error
-            warn_of(notes, level=4)
+            warn_of(notes)
             if step < 0:  # the step was given up
                 break
             if callback is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-import warnings
 import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -20,6 +19,7 @@ from ..base.check import number, number_of_threads
 from ..base.errors import NotConverged
 from ..base.files import STATE, check_output, new_file
 from ..base.names import NamedFields, UnknownNameError, unknown_name
+from ..base.notices import warn_user
 from ..results.field_types import NORMAL_FIELDS, TANGENTIAL_FIELDS
 from . import namelists
 from .row import Row, columns
@@ -256,9 +256,9 @@ class Simulation:
         if cells <= _FOLLOWED:
             return
         self._watches_speed = False
-        warnings.warn(f"the velocity that was set moves the road by {cells:.3g} cells in a step;"
-                      " the contact is well followed up to one cell per step:"
-                      f" dt = {(row.time - before.time) / cells:.3g} s", UserWarning, stacklevel=3)
+        warn_user(f"the velocity that was set moves the road by {cells:.3g} cells in a step; the"
+                  " contact is well followed up to one cell per step:"
+                  f" dt = {(row.time - before.time) / cells:.3g} s")
 
     def _last(self) -> Row:
         """Return the last row, as the library has it."""
@@ -484,7 +484,7 @@ class _Input:
         return self._text
 
 
-def warn_of(notes: bytes, level: int = 3) -> None:
-    """Issue the warnings of the library, one per line, at a level of the stack above this one."""
+def warn_of(notes: bytes) -> None:
+    """Issue the warnings of the library, one per line."""
     for line in notes.decode(errors="replace").strip().splitlines():
-        warnings.warn(line, UserWarning, stacklevel=level)
+        warn_user(line)

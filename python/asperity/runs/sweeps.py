@@ -8,7 +8,6 @@ import itertools
 import json
 import os
 import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 
 from ..base.check import choice, shown
 from ..base.files import make_folder, write_text
+from ..base.notices import warn_user
 from ..results import Run, open_result
 from ..results.column_types import HistoryColumns
 from ..results.steady import steady_mean
@@ -357,7 +357,7 @@ def _table(work: list[Job], shape: tuple[int, ...],
             units |= {name: run.history.units(name) if name in run.history else "1"
                       for name in found[-1] or ()}
     for line, name in warned.items():
-        warnings.warn(f"{name}: {line}", UserWarning, stacklevel=3)
+        warn_user(f"{name}: {line}")
     parameters = list(work[0].values)
     columns = {name: column([job.values[name] for job in work]) for name in parameters}
     results = dict.fromkeys(name for row in found if row is not None for name in row)

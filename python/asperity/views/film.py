@@ -34,6 +34,7 @@ from .style import (
     SLIP,
     STICK,
     axis_text,
+    fitted,
     label_of,
     print_style,
     si_scale,
@@ -167,7 +168,7 @@ def _animation(run: Run, field: str) -> tuple[FuncAnimation, Any]:
     along, column, mark = _curve(run, curve)
     curve.set_box_aspect(max(ratio, 0.6))
     if run.title:
-        figure.suptitle(run.title, parse_math=False)
+        figure.suptitle(fitted(run.title, figure.get_figwidth()), parse_math=False)
     title = panel.set_title(_moment(snapshots[0], snapshots[-1]))
     # The layout is computed once, because in every frame it would take most of the time.
     figure.canvas.draw()

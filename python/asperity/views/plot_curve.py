@@ -15,7 +15,7 @@ from matplotlib.ticker import (
     StrMethodFormatter,
 )
 
-from .style import DOUBLE_COLUMN, distinct_colours, print_style, shown_once, si_scale
+from .style import DOUBLE_COLUMN, distinct_colours, fitted, print_style, shown_once, si_scale
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +77,7 @@ def plot_friction_curve(curve: FrictionCurve) -> Figure:
             label = _words(plan.colours, float(colours[index])) if colours.size > 1 else "runs"
             grid[0, 0].plot([], [], "o-", color=colour, label=label)
         _legend(figure, grid[0, 0], plan)
-        figure.suptitle("\n".join(titles), parse_math=False)
+        figure.suptitle("\n".join(fitted(line, DOUBLE_COLUMN) for line in titles), parse_math=False)
     return shown_once(figure)
 
 

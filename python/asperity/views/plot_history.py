@@ -19,6 +19,7 @@ from .style import (
     LABELS,
     SINGLE_COLUMN,
     axis_text,
+    fitted,
     label_of,
     print_style,
     si_scale,
@@ -98,7 +99,8 @@ def plot_history(run: Run, name: str = "contact_area", x: str | None = None,
             above = axes.get_legend()
             count = 0 if above is None else len(above.get_texts())
             rows = -(-count // _legend_columns(count)) if count else 0
-            axes.set_title(run.title, parse_math=False,
+            title = fitted(run.title, SINGLE_COLUMN)
+            axes.set_title(title, parse_math=False,
                            pad=6.0 + 1.5 * rows * plt.rcParams["legend.fontsize"])
     return axes
 

@@ -24,6 +24,7 @@ from .style import (
     LABELS,
     SINGLE_COLUMN,
     axis_text,
+    fitted,
     print_style,
     shown_once,
     si_scale,
@@ -43,13 +44,14 @@ def plot_overview(run: Run) -> Figure:
     """Draw the most informative quantities of a run.
 
     With friction these are friction with its parts, contact area, stick area and sliding speed
-    over time, and the last maps of pressure and of stick and slip. Without friction they are the
-    last maps of pressure and gap, and one of these: contact area (and viscous friction) over time;
-    for a growing load, the contact area against the load, with Persson's theory if the road is
+    over time, and the last maps of pressure and of stick and slip. For a curve of steady states
+    they are friction, contact area and mean gap over the sliding speed. Without friction they are
+    the last maps of pressure and gap, and one of these: contact area and viscous friction over
+    time; for a growing load, the contact area against the load, with Persson's theory if the road is
     rough and the material elastic; for an approach that is prescribed in free mode, such as a
     pull-off, the normal force against the approach; for a single solve, a section through the
-    contact. A curve of steady states is drawn over the sliding speed. A run whose snapshots have
-    none of these fields, or that has no snapshots, shows its history.
+    contact. A run whose snapshots have none of these fields, or that has no snapshots, shows its
+    history.
 
     Parameters
     ----------
@@ -63,10 +65,10 @@ def plot_overview(run: Run) -> Figure:
     """
     with print_style():
         snapshot = run.snapshots[-1] if len(run.snapshots) else None
-        moving = run.history.rows > 1 and (np.ptp(run.history["time"]) > 0.0
-                                           or steady_speeds(run) is not None)
-        if has_friction(run) and moving:
-            return _frictional_overview(run)
+        curve = steady_speeds(run) is not None
+        moving = run.history.rows > 1 and (curve or np.ptp(run.history["time"]) > 0.0)
+        if moving and (curve or has_friction(run)):
+            return _sliding_overview(run)
         names = [name for name in ("pressure", "gap") if snapshot is not None and name in snapshot]
         grid = run.grid
         ratio = 0.8 if grid.ny == 1 else float(np.clip(grid.ly / grid.lx, 0.4, 1.6))
@@ -97,14 +99,15 @@ def plot_overview(run: Run) -> Figure:
         return shown_once(figure)
 
 
-def _frictional_overview(run: Run) -> Figure:
+def _sliding_overview(run: Run) -> Figure:
     """Draw friction, areas and speed over time on the left, and the last maps on the right.
 
     A curve of steady states shows friction, areas and gap over the speed.
     """
     curve = steady_speeds(run) is not None
     snapshot = run.snapshots[-1] if len(run.snapshots) else None
-    maps = [name for name in ("pressure", "contact") if snapshot is not None and name in snapshot]
+    maps = [name for name in ("pressure", "contact" if has_friction(run) else "gap")
+            if snapshot is not None and name in snapshot]
     columns = [name for name in ("friction", "contact_area", "mean_gap" if curve else
                                  "sliding_speed") if name in run.history]
     grid = run.grid
@@ -132,12 +135,13 @@ def _frictional_overview(run: Run) -> Figure:
 
 def _headline(run: Run, figure: Figure) -> None:
     """Write title and time of the last snapshot, and whether the run is finished."""
-    words = [f"{run.title or run.path.name}"]
+    rest = ""
     if len(run.snapshots):
-        words.append(when(run.snapshots[-1]))
-        words[-1] += steady_words(run, run.snapshots[-1].step)
-    figure.suptitle(": ".join(words) + ("" if run.finished else " (run not finished)"),
-                    parse_math=False)
+        rest = f": {when(run.snapshots[-1])}{steady_words(run, run.snapshots[-1].step)}"
+    if not run.finished:
+        rest += " (run not finished)"
+    title = fitted(run.title or run.path.name, figure.get_figwidth(), rest)
+    figure.suptitle(title + rest, parse_math=False)
 
 
 def _persson_applies(run: Run) -> bool:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..results import Snapshot
 
 __all__ = ["COLOURS", "DOUBLE_COLUMN", "LABELS", "NO_CONTACT", "PRINT", "SINGLE_COLUMN", "SLIP",
-           "STICK", "axis_text", "check_picture", "distinct_colours", "label_of", "print_style",
-           "save_picture", "sentence", "shown_once", "si_scale", "typeset", "when"]
+           "STICK", "axis_text", "check_picture", "distinct_colours", "fitted", "label_of",
+           "print_style", "save_picture", "sentence", "shown_once", "si_scale", "typeset", "when"]
 
 # Okabe and Ito's palette: blue, vermilion, green, purple, orange, sky blue, black.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -210,6 +210,31 @@ def typeset(text: str) -> str:
 def sentence(text: str) -> str:
     """Return a text that starts with a capital."""
     return text[:1].upper() + text[1:]
+
+
+def fitted(title: str, inches: float, rest: str = "") -> str:
+    """Return a title that fits above a figure together with other words.
+
+    Parameters
+    ----------
+    title : str
+        Title that the user has chosen. A long one is cut, and ends with an ellipsis.
+    inches : float
+        Width of the figure.
+    rest : str
+        Words that follow on the same line, which are not cut.
+
+    Examples
+    --------
+    >>> fitted("A block on a road", 3.5)
+    'A block on a road'
+    >>> len(fitted("A block " * 50, 3.5, ": step 3")) < 60
+    True
+    """
+    letter = 0.55 * PRINT["figure.titlesize"] / 72.0  # the average width, inches
+    room = max(int(inches / letter) - len(rest), 12)
+    words = " ".join(title.split())
+    return words if len(words) <= room else f"{words[:room - 1].rstrip()}\u2026"
 
 
 def when(snapshot: Snapshot) -> str:
