@@ -353,7 +353,7 @@ def test_a_height_map_in_another_unit_causes_warnings(program, tmp_path, dataset
     done = check(program, tmp_path, text)
     assert f"! warning: {unit}" in done.out and f"! warning: {slope}" in done.out
     done = call(program, "run", "case.nml", "--quiet", cwd=tmp_path)
-    assert done.err.startswith(unit) and slope in done.err
+    assert done.err.startswith(f"warning: {unit}") and slope in done.err
     with h5py.File(tmp_path / "case.h5") as file:
         assert unit in file.attrs["warnings"] and slope in file.attrs["warnings"]
     done = check(program, tmp_path, text.replace("'map.h5'", "'map.h5', scale = 1e-6"))

@@ -8,6 +8,7 @@ of the source, and the metadata of the instrument.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -264,6 +265,7 @@ def load(
     _check_window(periodic, taper, restore_rms)
     path = Path(path)
     height, sizes, is_periodic, unit, source = read_map(path, channel, unit, size, transpose)
+    turned = [] if size is None or transpose else _turned_note(height.shape, sizes)
     work = MapWork(height, sizes, is_periodic or periodic == _AS_IS)
     if periodic == _AS_IS:
         work.note("periodic")
@@ -294,7 +296,8 @@ def load(
         # Lengths that a file sums over cells contain rounding errors: keep twelve digits.
         lx, ly = (float(f"{length:.12g}") for length in (lx, ly))
     return MeasuredSurface(height, lx, ly, work.periodic, unit, work.steps, source,
-                           [*_jump_note(jump, level, unit, work.periodic), *_advice(work, level),
+                           [*turned, *_jump_note(jump, level, unit, work.periodic),
+                            *_advice(work, level),
                             *_outlier_note(height)])
 
 
@@ -384,6 +387,24 @@ def step_in_words(step: dict[str, Any]) -> str:
         "unit": lambda s: f"lengths and heights from {s['unit']} to m",
     }
     return words[step["step"]](step)
+
+
+def _turned_note(shape: tuple[int, ...], sizes: list[float]) -> list[str]:
+    """Return a note if the cells are oblong, but would be square with x and y exchanged.
+
+    Examples
+    --------
+    >>> _turned_note((64, 48), [4e-4, 3e-4])[0][:46]
+    'the cells are 1.78 times as long as wide; with'
+    >>> _turned_note((48, 64), [4e-4, 3e-4])
+    []
+    """
+    (ny, nx), (lx, ly) = shape, sizes
+    ratio, other = lx / nx * ny / ly, lx / ny * nx / ly
+    if ny == 1 or abs(math.log(ratio)) < 0.01 or abs(math.log(other)) > 1e-3:
+        return []
+    return [f"the cells are {max(ratio, 1 / ratio):.3g} times as long as wide; with the first index"
+            " of the file along y (transpose, --transpose) they would be square"]
 
 
 def _jump_note(jump: float | None, level: str, unit: str, windowed: bool) -> list[str]:
