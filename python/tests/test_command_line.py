@@ -386,7 +386,8 @@ def test_a_missing_height_map_is_reported_with_its_place(program, tmp_path):
     assert done.returncode == 3
     first, second = done.err.splitlines()
     assert first == ("case.nml: &surface: file = 'nowhere.h5': there is no such file (line 2)")
-    assert second == "case.nml: &surface: file = 'case.nml': is not an HDF5 file (line 3)"
+    assert second == ("case.nml: &surface: file = 'case.nml': is not an HDF5 file;"
+                      " `asperity import` makes one of a map in another format (line 3)")
     done = call(program, "run", "case.nml", cwd=tmp_path)
     assert done.returncode == 3
     assert done.err.splitlines()[-1] == first

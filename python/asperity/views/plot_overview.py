@@ -47,8 +47,8 @@ def plot_overview(run: Run) -> Figure:
     over time, and the last maps of pressure and of stick and slip. For a curve of steady states
     they are friction, contact area and mean gap over the sliding speed. Without friction they are
     the last maps of pressure and gap, and one of these: contact area and viscous friction over
-    time; for a growing load, the contact area against the load, with Persson's theory if the road is
-    rough and the material elastic; for an approach that is prescribed in free mode, such as a
+    time; for a growing load, the contact area against the load, with Persson's theory if the road
+    is rough and the material elastic; for an approach that is prescribed in free mode, such as a
     pull-off, the normal force against the approach; for a single solve, a section through the
     contact. A run whose snapshots have none of these fields, or that has no snapshots, shows its
     history.
