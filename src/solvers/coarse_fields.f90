@@ -20,6 +20,7 @@ module coarse_fields
       integer, allocatable :: first(:), last(:)    !! cells that a coarse cell covers, also in part [coarse cells]
       real(dp), allocatable :: from(:), to(:)      !! the parts of the coarse cell that lie in these two
       real(dp) :: part = 1.0_dp                    !! the part that lies in any cell between them
+      integer :: whole = 0                         !! cells of each coarse cell, if no cell is divided
    contains
       procedure :: take
    end type row_means_type
@@ -65,20 +66,45 @@ contains
    !> Means of a field over the coarse cells. Collective.
    subroutine coarsen(fine, coarse, field, threads, means)
       type(grid_type), intent(in) :: fine, coarse
-      real(dp), intent(in) :: field(:, :)          !! [fine%nx, fine%rows()]
+      real(dp), intent(in) :: field(fine%nx, fine%rows())
       integer, intent(in) :: threads
-      real(dp), intent(out) :: means(:, :)         !! [coarse%nx, coarse%rows()]
+      real(dp), intent(out) :: means(coarse%nx, coarse%rows())
       type(row_means_type) :: row
       real(dp), allocatable :: strips(:, :)
       integer :: j
 
-      allocate (strips(coarse%nx, fine%rows()))
       row = new_row_means(fine%nx, coarse%nx)
+      if (.not. fine%shared) then
+         call take_own_rows()
+         return
+      end if
+      allocate (strips(coarse%nx, fine%rows()))
       !$omp parallel do default(none) shared(field, strips, row) private(j) num_threads(threads)
       do j = 1, size(strips, 2)
          call row%take(field(:, j), strips(:, j))
       end do
       call mean_of_strips(fine, coarse, strips, threads, means)
+
+   contains
+
+      !> Form each coarse row from the rows that it covers, all of which belong to this process.
+      subroutine take_own_rows()
+         real(dp), allocatable :: strip(:)
+         integer :: k
+
+         !$omp parallel default(none) shared(fine, coarse, field, means, row) private(j, k, strip) num_threads(threads)
+         allocate (strip(coarse%nx))
+         !$omp do
+         do j = 1, coarse%ny
+            means(:, j) = 0.0_dp
+            do k = first_cell(fine%ny, coarse%ny, j), last_cell(fine%ny, coarse%ny, j)
+               call row%take(field(:, k), strip)
+               means(:, j) = means(:, j) + part_of(fine%ny, coarse%ny, k, j)*strip
+            end do
+         end do
+         !$omp end parallel
+      end subroutine take_own_rows
+
    end subroutine coarsen
 
    !> Means over the rows of the coarse cells, from the means along each row of the grid. Collective.
@@ -134,6 +160,7 @@ contains
       self%to = part_of(n, coarse, self%last, [(i, i=1, coarse)])
       where (self%last == self%first) self%to = 0.0_dp
       self%part = real(coarse, dp)/n
+      if (mod(n, coarse) == 0) self%whole = n/coarse
    end function new_row_means
 
    !> Take the means of the values of a row over its coarse cells.
@@ -144,6 +171,10 @@ contains
       real(dp) :: between
       integer :: i, k
 
+      if (self%whole > 0) then
+         call take_whole_cells(self%whole, size(means), values, means)
+         return
+      end if
       do i = 1, size(means)
          between = 0.0_dp
          do k = self%first(i) + 1, self%last(i) - 1
@@ -152,6 +183,30 @@ contains
          means(i) = self%from(i)*values(self%first(i)) + self%part*between + self%to(i)*values(self%last(i))
       end do
    end subroutine take
+
+   !> Take the means over coarse cells of n whole cells each. The usual numbers are written out, because the compiler then
+   !> forms several means at once.
+   pure subroutine take_whole_cells(n, count, values, means)
+      integer, intent(in) :: n, count
+      real(dp), intent(in) :: values(n, count)
+      real(dp), intent(out) :: means(count)
+      integer :: i
+
+      select case (n)
+      case (2)
+         !$omp simd
+         do i = 1, count
+            means(i) = 0.5_dp*(values(1, i) + values(2, i))
+         end do
+      case (4)
+         !$omp simd
+         do i = 1, count
+            means(i) = 0.25_dp*((values(1, i) + values(2, i)) + (values(3, i) + values(4, i)))
+         end do
+      case default
+         means(:) = sum(values, dim=1)/n
+      end select
+   end subroutine take_whole_cells
 
    !> The first of n cells that a coarse cell covers, also in part.
    elemental integer function first_cell(n, coarse, cell)
