@@ -222,7 +222,7 @@ contains
          return
       end if
       if (work%preconditioner%by_waves .and. now%preconditioned) call keep_block_sums(work, pressure, trial)
-      call find_clip(work, fixed_load, task%target*work%grid%cells(), pressure, trial, clipped)
+      call find_clip(work, fixed_load, task%target*work%grid%cells(), task%tolerance, pressure, trial, clipped)
       if (work%preconditioner%released) work%offset = work%offset + work%trial%shift/alpha
       ! The step may be many orders larger than the present load, which may be round-off at the first touch.
       call product%set_unit(max(measure%load, trial%above)/work%grid%cells())

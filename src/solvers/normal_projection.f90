@@ -17,7 +17,9 @@ module normal_projection
 
    public :: find_clip, keep_block_sums, longest_multiple, project_step, try_pressure
 
-   real(dp), parameter :: nearly_found = 1e-7_dp   !! error of the load from which a step of Newton's method finds it
+   !> Error of the load, over the root of the tolerance, from which a step of Newton's method finds it: the step leaves about
+   !> a tenth of the square of the error.
+   real(dp), parameter :: nearly_found = 0.1_dp
 
 contains
 
@@ -183,10 +185,11 @@ contains
    !> After a release of cells the sum may also be too small, because the offset of the direction is that before the
    !> release. The first step of Newton's method then leads below t, which may be negative because no projection gives
    !> pressure to cells that were released.
-   subroutine find_clip(self, fixed_load, load, pressure, sums, clipped)
+   subroutine find_clip(self, fixed_load, load, tolerance, pressure, sums, clipped)
       type(normal_work_type), intent(inout) :: self
       logical, intent(in) :: fixed_load
       real(dp), intent(in) :: load                   !! sum of P over the cells, Pa
+      real(dp), intent(in) :: tolerance              !! largest relative error of the load of a solution
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows())
       type(trial_sums_type), intent(in) :: sums      !! of the trial pressure above 0
       logical, intent(out) :: clipped                !! some trial pressure is negative
@@ -208,7 +211,7 @@ contains
          if (kept - load <= 1e-15_dp*load .and. .not. first) exit
          next%shift = self%trial%shift + (kept - load)/above%cells
          if (next%shift <= self%trial%shift .and. .not. first) exit  ! the limit of round-off is reached
-         if (abs(kept - load) <= nearly_found*load .and. sums%above <= 2.0_dp*load) then
+         if (abs(kept - load) <= nearly_found*sqrt(tolerance)*load .and. sums%above <= 2.0_dp*load) then
             self%trial = next
             return
          end if
