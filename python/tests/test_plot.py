@@ -21,6 +21,7 @@ import asperity
 from asperity.__main__ import main
 from asperity.plot import plot_history, si_scale
 from asperity.views.colour_scales import field_style
+from asperity.views.plot_road import plot_road
 from asperity.views.style import NO_CONTACT, SLIP, STICK
 
 
@@ -628,3 +629,20 @@ def test_a_full_disk_is_reported_with_the_name_of_the_picture(tmp_path, monkeypa
     assert main(["plot", str(tmp_path / "road.h5")]) == 3
     printed = f"asperity: {tmp_path / 'road.png'}: cannot be written: No space left on device\n"
     assert capsys.readouterr().err == printed
+
+
+def test_a_height_map_is_drawn_with_a_profile(tmp_path, capsys):
+    """`plot` refused height maps, which a user wants to see after an import."""
+    height = asperity.surface.self_affine(32, 24, lx=4e-4, wavelength_short=1e-4, rms_slope=0.2)
+    asperity.surface.save(tmp_path / "road.h5", height, 4e-4, 3e-4)
+    assert main(["plot", str(tmp_path / "road.h5")]) == 0
+    assert (tmp_path / "road.png").stat().st_size > 10_000
+    figure = plot_road(tmp_path / "road.h5")
+    heights, profile = figure.axes[:2]
+    drawn = heights.images[0].get_array()
+    assert np.allclose(drawn, height * 1e6)
+    assert np.allclose(profile.lines[0].get_ydata(), height[12] * 1e6)
+    assert "rms slope 0.2" in figure.get_suptitle()
+    with pytest.raises(SystemExit):
+        main(["plot", str(tmp_path / "road.h5"), "--field", "pressure"])
+    assert "is a height map" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..base.files import size_text
+from ..base.files import MAP, kind_of, size_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,8 +22,10 @@ def add_plot(verbs: Any) -> None:
                     " friction it shows friction, contact area, stick area and sliding speed over"
                     " time, and the last maps of pressure and of stick and slip. Otherwise it shows"
                     " the contact area, and the last maps of pressure and gap. A curve of steady"
-                    " states is drawn over the sliding speed.")
-    plot.add_argument("result", metavar="RESULT.h5", help="result of `asperity run`")
+                    " states is drawn over the sliding speed. A height map is drawn as a map of"
+                    " its heights and a profile.")
+    plot.add_argument("result", metavar="RESULT.h5",
+                      help="result of `asperity run`, or a height map of `asperity import`")
     plot.add_argument("-o", "--output", metavar="PNG", type=Path,
                       help="picture to write (.png, .pdf, .svg; a film .gif, .mp4);"
                            " default: RESULT.png beside the result")
@@ -59,27 +61,23 @@ def _plot(chosen: argparse.Namespace) -> int:
     import matplotlib.pyplot as plt
 
     from ..results import open_result
+    from ..views.plot_road import plot_road
     from ..views.style import check_picture, save_picture
 
     if chosen.output is not None and chosen.output.is_dir():
         raise IsADirectoryError(f"{chosen.output}: is a folder: name a picture in it")
     if chosen.film is None:
         check_picture(chosen.output)
-    run = open_result(chosen.result)
+    path = Path(chosen.result)
+    is_road = path.is_file() and kind_of(path) == MAP
+    if is_road and (chosen.field or chosen.history or chosen.film is not None):
+        chosen.error(f"{path} is a height map: it has no --field, --history or --film")
+    run = None if is_road else open_result(chosen.result)
     if chosen.film is None and chosen.output is None and not chosen.show:
-        check_picture(run.path.with_suffix(".png"))
-    if chosen.film is not None:
+        check_picture(path.with_suffix(".png"))
+    if run is not None and chosen.film is not None:
         return _film(run, chosen)
-    if chosen.field:
-        if not len(run.snapshots):
-            raise ValueError(f"{run.path}: holds no snapshots yet")
-        snapshots = run.snapshots
-        snapshot = snapshots[-1] if chosen.step is None else snapshots.at_step(chosen.step)
-        figure = snapshot.plot(chosen.field).figure.canvas.figure
-    elif chosen.history:
-        figure = run.plot(chosen.history, chosen.x).figure.canvas.figure
-    else:
-        figure = run.overview()
+    figure = plot_road(path) if run is None else _picture(run, chosen)
     if chosen.show:
         if not _has_windows(figure):
             raise ValueError("--show: no window can be opened: there is no display, or the backend"
@@ -87,11 +85,24 @@ def _plot(chosen: argparse.Namespace) -> int:
                              " --show a picture is written")
         plt.show()
         return 0
-    output = chosen.output or run.path.with_suffix(".png")
+    output = chosen.output or path.with_suffix(".png")
     save_picture(figure, output, 300)
     plt.close(figure)
     print(f"wrote {output}")
     return 0
+
+
+def _picture(run: Any, chosen: argparse.Namespace) -> Figure:
+    """Return the picture of a result that was chosen."""
+    if chosen.field:
+        snapshots = run.snapshots
+        if not len(snapshots):
+            raise ValueError(f"{run.path}: holds no snapshots yet")
+        snapshot = snapshots[-1] if chosen.step is None else snapshots.at_step(chosen.step)
+        return snapshot.plot(chosen.field).figure.canvas.figure
+    if chosen.history:
+        return run.plot(chosen.history, chosen.x).figure.canvas.figure
+    return run.overview()
 
 
 def _has_windows(figure: Figure) -> bool:

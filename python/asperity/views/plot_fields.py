@@ -39,7 +39,8 @@ if TYPE_CHECKING:
 
     from ..results import Grid, Snapshot
 
-__all__ = ["frame_of", "plot_field", "plot_section", "stretch_of", "write_lengths"]
+__all__ = ["draw_map", "draw_profile", "frame_of", "plot_field", "plot_section", "stretch_of",
+           "write_lengths"]
 
 ARROWS = 22  # along the longer side
 _MOST_UPRIGHT = 3.0  # ratio of the height of a map to its width up to which labels lie below it
@@ -83,11 +84,11 @@ def plot_field(snapshot: Snapshot, name: str = "pressure", ax: Axes | None = Non
         if grid.ny == 1 and name == "contact":
             _contact_profile(snapshot, ax)
         elif grid.ny == 1:
-            _profile(grid, field[0], label, snapshot.units(name), ax)
+            draw_profile(grid, field[0], label, snapshot.units(name), ax)
         elif name == "contact":
             _contact_map(snapshot, field, ax)
         else:
-            _map(grid, field, name, label, snapshot.units(name), ax)
+            draw_map(grid, field, name, label, snapshot.units(name), ax)
         wanted = arrows if arrows is not None else name == "contact"
         drawn = (wanted and grid.ny > 1 and "traction_x" in snapshot and "traction_y" in snapshot
                  and _arrows(snapshot, ax))
@@ -117,9 +118,9 @@ def plot_section(snapshot: Snapshot, ax: Axes | None = None) -> Axes:
     pressure, gap = snapshot["pressure"], without_round_off(snapshot, "gap")
     row = int(np.unravel_index(np.argmax(pressure), pressure.shape)[0])
     axes = ax if ax is not None else _new_axes((SINGLE_COLUMN, 2.4))
-    _profile(grid, pressure[row], "Pressure", snapshot.units("pressure"), axes)
+    draw_profile(grid, pressure[row], "Pressure", snapshot.units("pressure"), axes)
     other = axes.twinx()
-    _profile(grid, gap[row], "Gap", snapshot.units("gap"), other, COLOURS[1], "--")
+    draw_profile(grid, gap[row], "Gap", snapshot.units("gap"), other, COLOURS[1], "--")
     if not gap[row].any():
         other.set_yticks([0.0])
     other.grid(visible=False)
@@ -214,7 +215,8 @@ def _bar_lies(text: str, ratio: float, width: float) -> bool:
     return ratio < 0.45 or needed > 0.85 * width * ratio
 
 
-def _map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str, axes: Axes) -> None:
+def draw_map(grid: Grid, field: NDArray[Any], name: str, label: str, units: str,
+             axes: Axes) -> None:
     """Draw a map with its colour bar."""
     factor, unit, style = field_style(field, name, units)
     shown = without_open_cells(field * factor, name)
@@ -373,7 +375,7 @@ def _arrows(snapshot: Snapshot, axes: Axes) -> bool:
     return True
 
 
-def _profile(grid: Grid, field: NDArray[Any], label: str, units: str, axes: Axes,
+def draw_profile(grid: Grid, field: NDArray[Any], label: str, units: str, axes: Axes,
              colour: str = COLOURS[0], dashes: str = "-") -> None:
     """Draw values over x for a line contact."""
     length, length_unit = si_scale(grid.lx, "m")
