@@ -78,12 +78,13 @@ contains
       wide_blocks = self%before + (coarse%columns(2) + width - 1)/width
       allocate (self%least(blocks, self%rows), self%loaded(blocks, self%rows))
       allocate (self%live(blocks, self%rows), self%wide(wide_blocks, coarse%ny), source=.false.)
-      allocate (self%first(blocks, self%rows), self%last(blocks, self%rows), self%runs(self%rows))
+      allocate (self%first(blocks, self%rows), self%last(blocks, self%rows))
+      allocate (self%runs(self%rows), source=0)
       allocate (self%wide_first(wide_blocks, coarse%ny), self%wide_last(wide_blocks, coarse%ny))
       allocate (self%wide_runs(coarse%ny), source=0)
    end subroutine new_active_blocks
 
-   !> Deactivate all blocks, and set the work fields to zero.
+   !> Deactivate all blocks, and set the work fields to zero. The residuals are zero already outside the active blocks.
    subroutine clear(self, residual, direction, search, before)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: residual(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more
@@ -91,16 +92,19 @@ contains
       real(sp), intent(inout) :: search(self%columns(1) - 1:, self%all_rows(1) - 1:)
       real(sp), intent(inout), optional :: before(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! another residual
       logical :: another
-      integer :: j
+      integer :: j, k
 
       another = present(before)
-      !$omp parallel do default(none) shared(self, residual, direction, search, before, another) private(j) &
+      !$omp parallel do default(none) shared(self, residual, direction, search, before, another) private(j, k) &
       !$omp num_threads(self%threads)
       do j = self%all_rows(1) - 1, self%all_rows(2) + 1
-         residual(:, j) = 0.0_sp
          search(:, j) = 0.0_sp
-         if (another) before(:, j) = 0.0_sp
-         if (j >= 1 .and. j <= self%rows) direction(:, j) = 0.0_sp
+         if (j < 1 .or. j > self%rows) cycle
+         direction(:, j) = 0.0_sp
+         do k = 1, merge(self%runs(j), 0, any(self%live(:, j)))
+            residual(self%first(k, j):self%last(k, j), j) = 0.0_sp
+            if (another) before(self%first(k, j):self%last(k, j), j) = 0.0_sp
+         end do
       end do
       self%live = .false.
       self%wide = .false.

@@ -42,8 +42,8 @@ module schur_passes
       type(schur_blocks_type) :: blocks                  !! coarse parts and sums of each block
       type(image_sums_type) :: sums                      !! of the residual and its image
       ! Over the columns and rows; the residual and the direction have one more on each side:
-      real(sp), allocatable :: residual(:, :)            !! v on S, 0 on N
-      real(sp), allocatable :: before(:, :)              !! the residual of the iteration before
+      real(sp), pointer, contiguous :: residual(:, :) => null()   !! v on S, 0 on N
+      real(sp), pointer, contiguous :: before(:, :) => null()     !! the residual of the iteration before
       real(sp), allocatable :: search(:, :)              !! d, 0 on S
       real(sp), pointer, contiguous :: image(:, :) => null()      !! b
       real(sp), pointer, contiguous :: response(:, :) => null()   !! e of the last step
@@ -80,13 +80,13 @@ contains
       real(dp), intent(in) :: pressure(self%grid%nx, self%grid%rows()), gap(self%grid%nx, self%grid%rows())
       type(image_sums_type), allocatable :: rows(:)
       type(row_numbers_type) :: numbers
-      real(sp), allocatable :: oldest(:, :)
+      real(sp), pointer, contiguous :: oldest(:, :)
       real(dp) :: totals(2)
       integer :: c, jb, strips(2)
 
-      call move_alloc(self%before, oldest)
-      call move_alloc(self%residual, self%before)
-      call move_alloc(oldest, self%residual)
+      oldest => self%before
+      self%before => self%residual
+      self%residual => oldest
       allocate (rows(self%rows(1):self%rows(2)))
       !$omp parallel default(none) shared(self, coarse, active, scale, level, pressure, gap, rows) &
       !$omp private(c, jb, strips, numbers) num_threads(self%threads)
@@ -140,7 +140,7 @@ contains
          do k = 1, active%runs(j)
             associate (first => active%first(k, j))
                call residual_cells(active%last(k, j) - first + 1, scale, level, self%per_pressure, pressure(first, j), &
-                  gap(first, j), self%residual(first, j), column(first))
+                  gap(first, j), self%residual(first:, j), column(first))
             end associate
          end do
          call close_row(self, self%residual(:, j))
@@ -189,7 +189,7 @@ contains
          do k = 1, active%wide_runs(jb)
             associate (first => active%wide_first(k, jb))
                call image_cells(active%wide_last(k, jb) - first + 1, centre(first:), self%weights, &
-                  self%residual(first, j - 1), self%residual(first - 1, j), self%residual(first, j + 1), &
+                  self%residual(first:, j - 1), self%residual(first - 1:, j), self%residual(first:, j + 1), &
                   self%image(first:, j), numbers%column(first), numbers%count(first), rows(j))
             end associate
          end do
@@ -272,7 +272,7 @@ contains
                n = active%wide_last(k, jb) - first + 1
                if (step%first) then
                   call start_search_cells(n, real(om, sp), numbers%added(first), numbers%corrected(first), &
-                     self%residual(first, j), self%image(first:, j), self%search(first, j))
+                     self%residual(first:, j), self%image(first:, j), self%search(first, j))
                else
                   call search_cells(n, real(om, sp), self%length, step%beta, numbers%added(first), &
                      numbers%corrected(first), self%response(first:, j), self%image(first:, j), self%search(first, j))

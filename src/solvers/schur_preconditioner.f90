@@ -39,7 +39,7 @@
 !> Fields are in single precision: errors of 1e-7 do not matter in a preconditioner. Memory: five such fields, of which two
 !> lie in memory that the caller lends.
 module schur_preconditioner
-   use, intrinsic :: iso_c_binding, only : c_f_pointer, c_ptr
+   use, intrinsic :: iso_c_binding, only : c_f_pointer, c_null_ptr, c_ptr
    use active_blocks, only : active_blocks_type
    use coarse_level, only : coarse_level_type
    use asperity_errors, only : error_type
@@ -53,6 +53,7 @@ module schur_preconditioner
    use schur_passes, only : residual_pass, schur_fields_type, search_pass, step_type
    use schur_release, only : release_pass
    use schur_sweeps, only : response_sums_type
+   use zeroed_memory, only : free_field, new_zeroed_field
    use wave_preconditioner, only : new_wave_preconditioner, wave_preconditioner_type
    implicit none
    private
@@ -70,6 +71,7 @@ module schur_preconditioner
       real(dp) :: compliance = 0.0_dp                    !! typical eigenvalue of M A, m/Pa
       real(dp), private :: form = 0.0_dp                 !! r.M r
       real(dp) :: overlap = 0.0_dp                       !! (r before).M r, if by waves; `search` holds r before
+      type(c_ptr), private :: zeros(2) = c_null_ptr      !! memory of the residual and that before
       real(sp), pointer, contiguous, private :: own_memory(:, :, :) => null()   !! of the image and the response, if not lent
       type(wave_preconditioner_type) :: waves
       type(long_waves_type) :: long_waves                !! of a long or free grid, of which a release keeps the load
@@ -109,10 +111,11 @@ contains
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([wx, wy], sp)
       call set_centre(self, coarse, 2.0_dp*(wx + wy))
-      ! They take no memory before `clear` of module `active_blocks` sets them to zero, with the threads that use them.
+      ! The residuals take memory only where blocks become active.
       associate (left => self%columns(1) - 1, right => self%columns(2) + 1, low => self%rows(1) - 1, high => self%rows(2) + 1)
-         allocate (self%residual(left:right, low:high), self%search(left:right, low:high))
-         if (.not. self%by_waves) allocate (self%before(left:right, low:high))
+         allocate (self%search(left:right, low:high))
+         call new_zeroed_field([left, low], [right, high], self%zeros(1), self%residual)
+         if (.not. self%by_waves) call new_zeroed_field([left, low], [right, high], self%zeros(2), self%before)
       end associate
       extents = [self%columns(2) - self%columns(1), self%rows(2) - self%rows(1)] + 1
       if (product(int(extents, int64)) <= length) then
@@ -279,6 +282,8 @@ contains
       class(schur_preconditioner_type), intent(inout) :: self
 
       if (associated(self%own_memory)) deallocate (self%own_memory)
+      call free_field(self%zeros(1), self%residual)
+      call free_field(self%zeros(2), self%before)
       call self%blocks%model%destroy()
       call self%waves%destroy()
       call self%long_waves%destroy()
