@@ -450,3 +450,17 @@ def test_a_pull_without_an_equilibrium_separates_the_surfaces(potential, pull):
         asperity.solve_adhesive(height, length, None, 25e6, pressure=-pull, potential=potential,
                                 energy=0.05, range=2.071e-9, start="full_contact")
     assert int(re.search(r"after (\d+) iterations", str(caught.value))[1]) < 300
+
+
+def test_separated_surfaces_have_no_friction(tmp_path):
+    """The pressure that is left is round-off, and the ratio to it was of any size."""
+    run = asperity.run(asperity.Case(
+        grid=dict(nx=64, ny=1, lx=1e-4),
+        surface=dict(shape="sine", amplitude=1e-6, wavelength=1e-4),
+        material=dict(shear_modulus=1e6, prony_g=1e6, prony_tau=1e-3),
+        adhesion=dict(potential="maugis_dugdale", energy=0.01, range=1e-7),
+        phase=[dict(displacement=-1e-6), dict(duration=1e-3, steps=5, velocity_x=0.01)]),
+        output=tmp_path / "apart.h5", quiet=True)
+    assert not np.any(run.history["contact_area"])
+    assert np.all(np.abs(run.history["pressure"]) < 1e-12)
+    assert not np.any(run.history["friction"]) and not np.any(run.history["friction_viscous"])

@@ -202,6 +202,7 @@ def test_the_same_messages(change, message, program, tmp_path):
     (lambda: elastic().phase.append(velocityx=1.0), "did you mean 'velocity_x'"),
     (lambda: elastic().grid.nxx, "did you mean 'nx'"),
     (lambda: elastic()["grdi"], "did you mean 'grid'"),
+    (lambda: asperity.Case(material=dict(elastic_modulus=1.0)), "give shear_modulus = E"),
     (lambda: elastic().grid["nxx"], "did you mean 'nx'"),
     (lambda: asperity.Case.help("phase.presure"), "did you mean 'pressure'")])
 def test_misspelt_names_are_refused_immediately(build, message):

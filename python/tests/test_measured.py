@@ -1048,3 +1048,17 @@ def test_the_unit_of_the_heights_counts_beside_lengths_in_metres(tmp_path, unit,
             load(path)
     else:
         np.testing.assert_allclose(load(path, level="none").height, factor * height, rtol=1e-12)
+
+
+def test_a_map_that_is_probably_turned_is_noted(tmp_path):
+    """A NumPy array of this package has y first, but a file of another one x first."""
+    height = np.random.default_rng(1).normal(size=(48, 64))
+    np.save(tmp_path / "map.npy", height)
+    turned, right = (asperity.surface.load(tmp_path / "map.npy", unit="nm", size=(4e5, 3e5),
+                                           transpose=transpose) for transpose in (False, True))
+    assert any("with the first index of the file along y" in note for note in turned.notes)
+    assert not any("along y" in note for note in right.notes)
+    with h5py.File(tmp_path / "own.h5", "w") as file:
+        file["surface/height"] = height.T  # this dataset has y first and cannot be turned
+    own = asperity.surface.load(tmp_path / "own.h5", size=(4e-4, 3e-4))
+    assert not any("along y" in note for note in own.notes)

@@ -84,7 +84,8 @@ contains
       allocate (self%wide_runs(coarse%ny), source=0)
    end subroutine new_active_blocks
 
-   !> Deactivate all blocks, and set the work fields to zero. The residuals are zero already outside the active blocks.
+   !> Deactivate all blocks, and set the work fields to zero. The residuals are zero already outside the active blocks: at first
+   !> everywhere (module `zeroed_memory`), and later because `list_runs` sets them to zero in blocks that it deactivates.
    subroutine clear(self, residual, direction, search, before)
       class(active_blocks_type), intent(inout) :: self
       real(sp), intent(inout) :: residual(self%columns(1) - 1:, self%all_rows(1) - 1:)   !! all cells and one more

@@ -38,7 +38,7 @@
 !> direction, and three fields of the preconditioner: the residual, the residual of the iteration before, and the search
 !> direction); the operator's spectrum, whose memory is also used for two more fields of the preconditioner and, in mixed
 !> precision, for the spectrum in single precision; a quarter for the operator's symbol (an eighth in mixed precision);
-!> and 0.4 for blocks and the coarse level. The two residuals take memory only where blocks have been active. In free mode
+!> and 0.4 for blocks and the coarse level. The two residuals take memory only near the contact. In free mode
 !> spectrum and symbol take three (three and a half in mixed precision). A start from a coarser grid takes 0.7 more until it
 !> is found, and 2.0 with a grid between the two.
 module normal_cg

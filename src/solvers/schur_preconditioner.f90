@@ -111,7 +111,7 @@ contains
       wy = merge(0.0_dp, stencil_c1*coarse%h/grid%dy, grid%ny == 1)
       self%weights = real([wx, wy], sp)
       call set_centre(self, coarse, 2.0_dp*(wx + wy))
-      ! The residuals take memory only where blocks become active.
+      ! The residuals take memory only where wide blocks come into use (module `active_blocks`).
       associate (left => self%columns(1) - 1, right => self%columns(2) + 1, low => self%rows(1) - 1, high => self%rows(2) + 1)
          allocate (self%search(left:right, low:high))
          call new_zeroed_field([left, low], [right, high], self%zeros(1), self%residual)

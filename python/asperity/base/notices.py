@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from pathlib import Path
 
 __all__ = ["warn_user"]
 
-_PACKAGE = str(Path(__file__).parents[1])  # as the names of the other files, links included
+_PACKAGE = f"{Path(__file__).parents[1]}{os.sep}"  # links included, as in the names of its files
 
 
 def warn_user(text: str) -> None:

@@ -265,7 +265,7 @@ def load(
     _check_window(periodic, taper, restore_rms)
     path = Path(path)
     height, sizes, is_periodic, unit, source = read_map(path, channel, unit, size, transpose)
-    turned = [] if size is None or transpose else _turned_note(height.shape, sizes)
+    turned = [] if size is None or transpose else _turned_note(height.shape, sizes, source)
     work = MapWork(height, sizes, is_periodic or periodic == _AS_IS)
     if periodic == _AS_IS:
         work.note("periodic")
@@ -389,19 +389,22 @@ def step_in_words(step: dict[str, Any]) -> str:
     return words[step["step"]](step)
 
 
-def _turned_note(shape: tuple[int, ...], sizes: list[float]) -> list[str]:
+def _turned_note(shape: tuple[int, ...], sizes: list[float], source: dict[str, Any]) -> list[str]:
     """Return a note if the cells are oblong, but would be square with x and y exchanged.
+
+    Maps of this program have y first and cannot be turned.
 
     Examples
     --------
-    >>> _turned_note((64, 48), [4e-4, 3e-4])[0][:46]
+    >>> _turned_note((64, 48), [4e-4, 3e-4], {"format": "npy"})[0][:46]
     'the cells are 1.78 times as long as wide; with'
-    >>> _turned_note((48, 64), [4e-4, 3e-4])
+    >>> _turned_note((48, 64), [4e-4, 3e-4], {"format": "npy"})
     []
     """
     (ny, nx), (lx, ly) = shape, sizes
     ratio, other = lx / nx * ny / ly, lx / ny * nx / ly
-    if ny == 1 or abs(math.log(ratio)) < 0.01 or abs(math.log(other)) > 1e-3:
+    is_own = source["format"] == "asperity"
+    if is_own or ny == 1 or abs(math.log(ratio)) < 0.01 or abs(math.log(other)) > 1e-3:
         return []
     return [f"the cells are {max(ratio, 1 / ratio):.3g} times as long as wide; with the first index"
             " of the file along y (transpose, --transpose) they would be square"]

@@ -17,6 +17,8 @@ from .sampled_law import Law, sampled_law
 __all__ = ["Group", "Groups", "UnknownVariableError", "entry_of"]
 
 _WIDTH = 96  # longest line of a written list
+#: Other names of Young's modulus, as the program knows them (input_values.f90).
+_NAMES_OF_TENSION = ("e", "e_modulus", "elastic_modulus", "young_modulus", "youngs_modulus")
 
 
 class UnknownVariableError(UnknownNameError, AttributeError, ValueError):
@@ -96,7 +98,7 @@ class Group(MutableMapping[str, Any]):
         """Return the description of a variable."""
         variable = self._entry.variables.get(name) if isinstance(name, str) else None
         if variable is None:
-            if str(name).lower().startswith("young") and self._entry.name == "material":
+            if str(name).lower() in _NAMES_OF_TENSION and self._entry.name == "material":
                 raise UnknownVariableError(f"&material: no variable is named {name!r}: give"
                                            " shear_modulus = E/(2 (1 + poisson))")
             raise UnknownVariableError(f"&{self._entry.name}: " + unknown_name(
